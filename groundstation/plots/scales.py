@@ -65,7 +65,7 @@ def span_of(
     Examples
     --------
     >>> span_of("linear", None, 10.0, np.array([0.0, 4.0]), is_tight=True)
-    Span(scale='linear', low=0.0, high=10.0, linear_to=1.0)
+    ScaleSpan(scale='linear', low=0.0, high=10.0, linear_to=1.0)
     >>> span_of("log", None, None, np.zeros(0), is_tight=True).low
     1.0
     """

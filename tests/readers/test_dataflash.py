@@ -224,7 +224,7 @@ def test_events_and_landed_flag(tmp_path: Path) -> None:
     log = Log(tmp_path / "copter.BIN", copter.content)
     assert log.present("event", "name") == [
         *("ArduCopter V4.3.0", "armed", "mode LOITER", "not landed", "land complete", "disarmed", "event 250"),
-        "error: subsystem 16, code 2",
+        "EKF check: bad variance",
     ]
     assert log.present("discrete", "weight_on_wheels") == [False, True], "unknown before the first event"
     assert "land" in log.derived("discrete", "weight_on_wheels")

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_360
+from groundstation.base.ardupilot_codes import EVENTS, MODES, error_name
 from groundstation.base.atmosphere import REFUSED, pressure_altitude_m
 from groundstation.base.geodesy import has_position
 from groundstation.base.records import BoolArray, Column, Damage, RecordBatch, Remark, frozen
 from groundstation.readers.dataflash import rules
 from groundstation.readers.dataflash.choices import Choices
 from groundstation.readers.dataflash.overview import DataflashOverview, Unit
-from groundstation.readers.dataflash.rules import EVENTS, FIX_2D, FIX_3D, MODES, FieldRule, UnknownUnits
+from groundstation.readers.dataflash.rules import FIX_2D, FIX_3D, FieldRule, UnknownUnits
 from groundstation.readers.dataflash.values import RecordRows, as_double
 from groundstation.readers.layout import velocity_from_track
 from groundstation.readers.parts import TopicPart, bounded, merged, occupied
@@ -279,7 +280,7 @@ def event_names(rows: RecordRows, vehicle: str) -> NDArray[np.str_] | None:
             return _named(rows.values("Mode"), lambda number: _mode(number, known))
         case "ERR" if definition.has_integers("Subsys", "ECode"):
             subsystem, code = (rows.values(name).astype(np.int64) for name in ("Subsys", "ECode"))
-            return _named(subsystem * 1000 + code, lambda pair: f"error: subsystem {pair // 1000}, code {pair % 1000}")
+            return _named(subsystem * 1000 + code, lambda pair: error_name(pair // 1000, pair % 1000))
     return None
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from groundstation.systems.health import px4
+from groundstation.systems.health import ardupilot, mavlink, px4
 from groundstation.systems.health.evidence import Event, Evidence
 from groundstation.tables.table import Flight
 
@@ -18,7 +18,11 @@ class Autopilot:
     events: Callable[[Flight], tuple[Event, ...]]
 
 
-AUTOPILOTS = (Autopilot("PX4", px4.applies, px4.evidence, px4.events),)
+AUTOPILOTS = (
+    Autopilot("PX4", px4.applies, px4.evidence, px4.events),
+    Autopilot("ArduPilot", ardupilot.applies, ardupilot.evidence, ardupilot.events),
+    Autopilot("MAVLink telemetry", mavlink.applies, mavlink.evidence, mavlink.events),
+)
 
 
 def autopilot_of(flight: Flight) -> Autopilot | None:

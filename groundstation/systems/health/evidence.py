@@ -18,6 +18,7 @@ FloatArray = NDArray[np.float64]
 Grade = Literal["info", "warn", "fail"]
 SHORTEST_FLIGHT_S = 2.0  # a shorter span off the ground is a flag that bounces
 NS = int(NS_PER_S)
+ARMED_BIT = 128  # of MAVLink's base mode
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +114,7 @@ def in_the_air(flight: Flight, known: Known) -> Spans:
     Its own flag of being landed comes first, then the flight phases, then the time it was armed, then the whole log:
     a rover, a boat and a log without any of them are judged too, and the words say over what.
     """
-    for spans in (_by_landed_flag(flight), _by_phases(flight, known.phases), _by_armed(flight)):
+    for spans in (_by_landed_flag(flight), _by_flying(flight), _by_phases(flight, known.phases), _by_armed(flight)):
         if len(spans.start_ns):
             return spans
     return whole_log(flight)
@@ -132,6 +133,14 @@ def _by_landed_flag(flight: Flight) -> Spans:
     return spans_where(contact.time_ns, ~contact.on_ground, contact.hold_ns, contact.name)
 
 
+def _by_flying(flight: Flight) -> Spans:
+    """Return when an ArduPilot plane took itself for flying."""
+    if "raw.STAT" not in flight or not flight["raw.STAT"].has("isFlying"):
+        return _none()
+    table = flight["raw.STAT"]
+    return spans_where(table.time_ns, table.values("isFlying") == 1.0, 10 * NS, "STAT.isFlying")
+
+
 def _by_phases(flight: Flight, phases: Phases) -> Spans:
     found = [one for one in phases.intervals if one.phase == "airborne"]
     start = np.array([flight.start_ns + round(one.start_s * NS_PER_S) for one in found], dtype=np.int64)
@@ -144,12 +153,23 @@ def _by_armed(flight: Flight) -> Spans:
         table = flight["raw.vehicle_status"]
         armed = table.values("arming_state") == 2.0
         return spans_where(table.time_ns, armed, 10 * NS, "vehicle_status.arming_state", "while armed")
-    if "raw.ARM" in flight and flight["raw.ARM"].has("ArmState"):
-        table = flight["raw.ARM"]
-        end_ns = flight.start_ns + round(flight.duration_s * NS_PER_S)
-        time_ns = np.append(table.time_ns, max(end_ns, int(table.time_ns[-1])))
-        armed = np.append(table.values("ArmState") == 1.0, False)
-        return spans_where(time_ns, armed, end_ns - flight.start_ns + 1, "ARM.ArmState", "while armed")
+    if "raw.HEARTBEAT" in flight and flight["raw.HEARTBEAT"].has("base_mode"):
+        table = flight["raw.HEARTBEAT"]
+        armed = table.values("base_mode").astype(np.int64) & ARMED_BIT != 0
+        return spans_where(table.time_ns, armed, 10 * NS, "HEARTBEAT.base_mode", "while armed")
+    if "raw.STAT" in flight and flight["raw.STAT"].has("Armed"):
+        table = flight["raw.STAT"]
+        return spans_where(table.time_ns, table.values("Armed") == 1.0, 10 * NS, "STAT.Armed", "while armed")
+    for name, field, yes, no in (("ARM", "ArmState", 1.0, 0.0), ("EV", "Id", 10.0, 11.0)):
+        if f"raw.{name}" in flight and flight[f"raw.{name}"].has(field):
+            table = flight[f"raw.{name}"]
+            told = table.take(np.isin(table.values(field), (yes, no)))
+            if not len(told):
+                continue
+            end_ns = flight.start_ns + round(flight.duration_s * NS_PER_S)
+            time_ns = np.append(told.time_ns, max(end_ns, int(told.time_ns[-1])))
+            armed = np.append(told.values(field) == yes, False)
+            return spans_where(time_ns, armed, end_ns - flight.start_ns + 1, f"{name}.{field}", "while armed")
     return _none()
 
 

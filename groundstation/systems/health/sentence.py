@@ -38,6 +38,9 @@ OF_QUANTITY: Mapping[str, str] = {  # what a person says where this quantity dec
     "dropouts_ms": "log with gaps",
     "cpu_load": "CPU overloaded",
     "slow_loops": "loops too slow",
+    "not_the_one_set": "the filter that is set did not fly",
+    "radio_margin_db": "radio weak",
+    "packets_lost": "telemetry with losses",
     "time_slip_s": "filter's clock slipped",
     "supply_v": "supply of the board off",
     "supply_swing_v": "supply of the board swings",
@@ -104,6 +107,9 @@ def _special(check: Check) -> str:
     measure = check.decisive
     if measure is not None and measure.quantity in OF_QUANTITY:
         return OF_QUANTITY[measure.quantity]
+    if measure is not None and measure.quantity.endswith("_unused"):
+        beside = {"innovations": "doubts its sensors", "resets": "went its own way"}.get(check.key, "is in doubt")
+        return f"a filter not in use {beside}"
     if check.key == "faults" and check.first_event_s is not None:
         first = check.reason.partition("; ")[0]
         return f"“{first}”" if len(first) <= LONGEST else ""

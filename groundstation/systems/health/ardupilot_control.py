@@ -1,0 +1,216 @@
+"""Evidence of an ArduPilot's power, links and control: battery, radio, tracking, outputs at their end.
+
+Source: ArduPilot, AP_Logger/LogStructure.h of all versions from 2013 to 4.7.0-dev of 2025-10-24 (CURR: hundredths of
+volt and ampere in integers until 3.3, Vcc in millivolts); SERVOn_FUNCTION of AP SRV_Channel.h; wiki, telemetry radios:
+RSSI and noise in steps of 1.9 per dB.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from groundstation.base.angles import wrap_180
+from groundstation.base.records import BoolArray, Int64Array
+from groundstation.base.units import NS_PER_S
+from groundstation.systems.health.ardupilot_sensors import supply
+from groundstation.systems.health.evidence import Evidence
+from groundstation.systems.health.logged import (
+    FloatArray,
+    Series,
+    bit,
+    instances,
+    is_integer,
+    is_number,
+    lasting,
+    latest,
+    named,
+)
+from groundstation.tables.parameters import Parameters, parameters_of
+from groundstation.tables.table import Flight
+
+LOW_AFTER_S = 10.0  # BATT_LOW_TIMER
+LEAST_VOLT = 2.0  # a battery that is never above it is none
+STEPS_PER_DB = 1.9
+# Modes without a setpoint of attitude: MANUAL, TRAINING, ACRO, INITIALISING, QACRO of planes; ACRO, FLIP of copters.
+FREE = {"plane": (0.0, 3.0, 4.0, 16.0, 23.0), "copter": (1.0, 14.0)}
+MOTORS, SURFACES = (*range(33, 41), *range(82, 86)), (4, 19, 21, 24, 25, 77, 78, 79, 80, 86, 87)
+OUTPUTS = 16
+FULL = 0.98  # of the travel, where an output counts as at its end
+DEFAULT_CAPACITY_MAH = 3300.0
+
+
+def battery(flight: Flight) -> Iterator[Evidence]:
+    """Yield the state by the autopilot's own limits of voltage, the charge left, and the supply of the board."""
+    parameters = parameters_of(flight)
+    for table, instance in instances(flight, "BAT", "BAT2") or instances(flight, "CURR", "CUR2"):
+        field = named(table, "Volt")
+        if field:
+            volt = table.values(field) * (0.01 if is_integer(table, field) else 1.0)
+            yield from voltage(f"{table.topic}.{field}", table.time_ns, volt, instance, parameters)
+        if is_number(table, "RemPct") and parameters.value(_prefix(instance) + "CAPACITY") != DEFAULT_CAPACITY_MAH:
+            left = table.values("RemPct")
+            left = np.where(left <= 100.0, left / 100.0, np.nan)
+            source = f"{table.topic}.RemPct"
+            yield Evidence("battery", "battery_remaining", f"battery {instance + 1}", source, "", table.time_ns, left)
+    for name in ("POWR", "CURR"):
+        topic = f"raw.{name}"
+        if topic in flight and is_number(flight[topic], "Vcc"):
+            table = flight[topic]
+            volt = table.values("Vcc")
+            volt = np.where(volt > 0.0, volt * (0.001 if np.nanmedian(volt) > 100.0 else 1.0), np.nan)
+            if np.isfinite(volt).any():
+                yield from supply(f"{topic}.Vcc", table.time_ns, volt)
+                return
+
+
+def _prefix(instance: int) -> str:
+    return "BATT_" if instance == 0 else f"BATT{instance + 1}_"
+
+
+def voltage(
+    source: str, time_ns: Int64Array, volt: FloatArray, instance: int, parameters: Parameters
+) -> Iterator[Evidence]:
+    """Yield 1 where the voltage is below the low limit for ten seconds, 2 below the critical one.
+
+    Without a limit in the log nothing is said: the number of cells is not known. A battery that is below its limit all
+    the time, at a few volts, is none: the aircraft was on another supply.
+    """
+    names = (f"{_prefix(instance)}LOW_VOLT", *(("FS_BATT_VOLTAGE", "LOW_VOLT") if instance == 0 else ()))
+    low, critical = parameters.value(*names), parameters.value(f"{_prefix(instance)}CRT_VOLT")
+    if not low or not np.any(volt > LEAST_VOLT):
+        return
+    time_s = (time_ns - time_ns[0]) / NS_PER_S
+    after_s = parameters.value("BATT_LOW_TIMER") or LOW_AFTER_S
+    state = lasting(time_s, volt < low, after_s).astype(np.float64)
+    if critical:
+        state += lasting(time_s, volt < critical, after_s)
+    state = np.where(np.isfinite(volt), state, np.nan)
+    told = f"{source} below {low:g} V" + (f" and {critical:g} V" if critical else "")
+    yield Evidence("battery", "battery_warning", f"battery {instance + 1}", told, "", time_ns, state, instance)
+
+
+def link(flight: Flight) -> Iterator[Evidence]:
+    """Yield strength and failsafe of the remote control, fade margin of the radio, and packets lost."""
+    for table, _ in instances(flight, "RSSI"):
+        if is_number(table, "RXRSSI") and np.any(table.values("RXRSSI") > 0.0):
+            value = table.values("RXRSSI")
+            yield Evidence("link", "rc_rssi", "remote control", f"{table.topic}.RXRSSI", "", table.time_ns, value)
+    for table, _ in instances(flight, "RCI2"):
+        if is_number(table, "Flags"):
+            lost = bit(table.values("Flags"), 1)
+            yield Evidence("link", "rc_lost", "remote control", f"{table.topic}.Flags", "", table.time_ns, lost)
+    for table, _ in instances(flight, "RAD"):
+        for signal, noise, sensor in (
+            ("RSSI", "Noise", "radio, aircraft"),
+            ("RemRSSI", "RemNoise", "radio, ground"),
+        ):
+            if is_number(table, signal, noise) and np.any(table.values(signal) > 0.0):
+                margin = (table.values(signal) - table.values(noise)) / STEPS_PER_DB
+                source = f"{table.topic}.{signal} - {noise}"
+                yield Evidence("link", "radio_margin_db", sensor, source, "dB", table.time_ns, margin)
+    for table, instance in instances(flight, "MAV"):
+        if is_number(table, "rxp", "rxdp") and np.any(table.values("rxp") > 0.0):
+            lost, received = _steps(table.values("rxdp")), _steps(table.values("rxp"))
+            share = lost / np.where(lost + received > 0.0, lost + received, np.nan)
+            source = f"{table.topic}.rxdp / (rxp + rxdp)"
+            yield Evidence("link", "packets_lost", f"telemetry {instance}", source, "", table.time_ns, share, instance)
+
+
+def _steps(counter: FloatArray) -> FloatArray:
+    """Return by how much a counter of 16 bits rose since the row before."""
+    return np.mod(np.diff(counter, prepend=counter[:1]), 65_536.0)
+
+
+def tracking(flight: Flight) -> Iterator[Evidence]:
+    """Yield attitude and rate against their setpoints, in modes that have one."""
+    for topic, wanted, had in (
+        ("raw.ATT", ("DesRoll", "DesPitch"), ("Roll", "Pitch")),
+        ("raw.CTUN", ("NavRoll", "NavPitch"), ("Roll", "Pitch")),  # planes before ATT had setpoints
+    ):
+        if topic in flight and is_number(flight[topic], *wanted, *had):
+            table = flight[topic]
+            apart = [
+                np.abs(wrap_180(table.values(one) - table.values(two))) for one, two in zip(wanted, had, strict=True)
+            ]
+            value = np.where(_is_held(flight, table.time_ns), np.max(np.stack(apart), axis=0), np.nan)
+            if np.isfinite(value).any():
+                source = f"{topic}.{', '.join(wanted)}"
+                sensor = "roll and pitch"
+                yield Evidence("tracking", "attitude_tracking_deg", sensor, source, "deg", table.time_ns, value)
+            break
+    if "raw.RATE" in flight and is_number(flight["raw.RATE"], "RDes", "R", "PDes", "P"):
+        table = flight["raw.RATE"]
+        apart = [np.abs(table.values(one) - table.values(two)) for one, two in (("RDes", "R"), ("PDes", "P"))]
+        value = np.max(np.stack(apart), axis=0)
+        yield Evidence("tracking", "rate_tracking_dps", "roll and pitch", "raw.RATE", "deg/s", table.time_ns, value)
+
+
+def _is_held(flight: Flight, time_ns: Int64Array) -> BoolArray:
+    """Tell when a mode with a setpoint of attitude was flown; always, where no modes are logged."""
+    if "raw.MODE" not in flight:
+        return np.ones(len(time_ns), dtype=bool)
+    table = flight["raw.MODE"]
+    field = named(table, "ModeNum", "Mode")
+    if not field:
+        return np.ones(len(time_ns), dtype=bool)
+    mode = latest(Series(table.time_ns, table.values(field)), time_ns)
+    return np.isfinite(mode) & ~np.isin(
+        mode, FREE["copter" if "Copter" in flight.metadata.get("vehicle", "") else "plane"]
+    )
+
+
+def saturation(flight: Flight) -> Iterator[Evidence]:
+    """Yield 1 where a motor is at full, or a surface at an end of its travel.
+
+    What an output does, and its ends, stand in the parameters: without them nothing is said.
+    """
+    parameters = parameters_of(flight)
+    if "raw.RCOU" not in flight:
+        return
+    table = flight["raw.RCOU"]
+    found: dict[str, list[FloatArray]] = {"motors": [], "surfaces": []}
+    sources: dict[str, list[str]] = {"motors": [], "surfaces": []}
+    for number in range(1, OUTPUTS + 1):
+        field = named(table, f"C{number}", f"Ch{number}", f"Chan{number}")
+        kind = _kind(parameters, number)
+        ends = _ends(parameters, number)
+        if not field or not kind or ends is None:
+            continue
+        pulse, (low, high) = table.values(field), ends
+        pulse = np.where((pulse > 500.0) & (pulse < 2500.0), pulse, np.nan)
+        share = (pulse - low) / (high - low)
+        is_full = share >= FULL
+        if kind == "surfaces":
+            is_full |= share <= 1.0 - FULL
+        found[kind].append(np.where(np.isfinite(share), is_full, np.nan))
+        sources[kind].append(field)
+    for name, each in found.items():
+        if each:
+            value = _any(np.stack(each))
+            source = f"raw.RCOU.{', '.join(sources[name])}"
+            yield Evidence("saturation", "output_full", name, source, "", table.time_ns, value)
+
+
+def _any(values: FloatArray) -> FloatArray:
+    """Return 1 where any is set, NaN where none is known."""
+    known = np.isfinite(values)
+    return np.where(known.any(axis=0), np.max(np.where(known, values, 0.0), axis=0), np.nan)
+
+
+def _kind(parameters: Parameters, number: int) -> str:
+    function = parameters.value(f"SERVO{number}_FUNCTION", f"RC{number}_FUNCTION")
+    if function is not None and int(function) in MOTORS:
+        return "motors"
+    return "surfaces" if function is not None and int(function) in SURFACES else ""
+
+
+def _ends(parameters: Parameters, number: int) -> tuple[float, float] | None:
+    """Return the ends of an output: those of motors where it is one, else its own."""
+    if _kind(parameters, number) == "motors":
+        low, high = parameters.value("MOT_PWM_MIN"), parameters.value("MOT_PWM_MAX")
+        if low and high and high > low:
+            return low, high
+        low, high = parameters.value("RC3_MIN"), parameters.value("RC3_MAX")  # MOT_PWM_MAX = 0: those of the throttle
+        return (low, high) if low and high and high > low else None
+    low, high = (parameters.value(f"SERVO{number}_{end}", f"RC{number}_{end}") for end in ("MIN", "MAX"))
+    return (low, high) if low and high and high > low else None

@@ -1,0 +1,190 @@
+"""What an autopilot said: logged text by its own level, error codes by name, changes of mode with their reason.
+
+A text that has no level (MSG of DataFlash) is graded by known words. A failsafe is never information, unless the text
+or the code says that it is over.
+"""
+
+import re
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from groundstation.base.ardupilot_codes import (
+    BAD_MODE_REASONS,
+    EVENTS,
+    GRAVE_SUBSYSTEMS,
+    MODE_REASONS,
+    MODES,
+    error_name,
+)
+from groundstation.base.findings import Finding
+from groundstation.base.log_levels import severity_of_level, severity_of_text
+from groundstation.systems.health.evidence import Event, Grade
+from groundstation.systems.health.logged import is_number, named
+from groundstation.tables.table import Flight, Table
+
+ULOG_TEXT, DATAFLASH_TEXT, MAVLINK_TEXT = "raw.ulog.text", "raw.MSG", "raw.STATUSTEXT"
+_NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
+_GRAVE_EVENTS, _LIGHT_EVENTS = (19, 51, 54), (34, 35, 59, 60, 62)  # EV that are a failure, and a warning
+_ESTIMATOR_EVENTS = (60, 62)
+_SWITCH_EVENTS = (67, 90)
+_OF_CHECK = (
+    ("switches", re.compile(r"lane switch|switch(?:ed|ing) to (?:compass|lane|imu|gps|primary)", re.I)),
+    ("resets", re.compile(r"(?:yaw|position|velocity|height) re-?(?:set|align)", re.I)),
+    ("gnss", re.compile(r"\b(?:gps|gnss)\b.*(?:glitch|lost|no fix|jamm|spoof|unhealthy)", re.I)),
+    ("battery", re.compile(r"battery", re.I)),
+)
+LANE_SWITCH = 24
+MOST_TOLD = 12  # kinds of messages that are a finding each
+
+
+class Message(NamedTuple):
+    """Text that was logged, with its grade."""
+
+    time_ns: int
+    grade: Grade
+    text: str
+    source: str
+
+
+def messages(flight: Flight) -> tuple[Message, ...]:
+    """Return logged text in order of time, graded by its level, or by its words where it has none."""
+    return flight.once("logged messages", lambda one: tuple(sorted(_read(one))))
+
+
+def _read(flight: Flight) -> Iterator[Message]:
+    for topic, field, level in (
+        (ULOG_TEXT, "text", "severity"),
+        (DATAFLASH_TEXT, "Message", ""),
+        (MAVLINK_TEXT, "text", "severity"),
+    ):
+        if topic not in flight or not flight[topic].has(field):
+            continue
+        table = flight[topic]
+        texts = table.text(field).tolist()
+        levels: list[int | str | None] = _levels(table, level) if level else [None] * len(texts)
+        for time_ns, text, one in zip(table.time_ns.tolist(), texts, levels, strict=True):
+            if text.strip():
+                grade = severity_of_text(text) if one is None else severity_of_level(one, text)
+                yield Message(time_ns, grade, text.strip(), topic)
+
+
+def _levels(table: Table, field: str) -> list[int | str | None]:
+    """Return levels as numbers or names, None where they are absent."""
+    if not is_number(table, field):
+        names = table.text(field).tolist() if table.has(field) else [""] * len(table)
+        return [one or None for one in names]
+    return [int(one) if np.isfinite(one) else None for one in table.values(field).tolist()]
+
+
+def events(flight: Flight) -> Iterator[Event]:
+    """Yield text, error codes, events and changes of mode as events of the checks they concern."""
+    yield from texts(flight)
+    yield from _errors(flight)
+    yield from _plain_events(flight)
+    yield from _modes(flight)
+
+
+def texts(flight: Flight) -> Iterator[Event]:
+    """Yield logged text as events of the checks it speaks of.
+
+    A sensor or lane that was switched is worth a warning, whatever its level.
+    """
+    for one in messages(flight):
+        is_switch = bool(_OF_CHECK[0][1].search(one.text))
+        grade: Grade = "warn" if is_switch and one.grade == "info" else one.grade
+        check = next((check for check, words in _OF_CHECK if grade != "info" and words.search(one.text)), "faults")
+        yield Event(check, one.time_ns, grade, one.text, one.source)
+
+
+def _errors(flight: Flight) -> Iterator[Event]:
+    if "raw.ERR" not in flight or not is_number(flight["raw.ERR"], "Subsys", "ECode"):
+        return
+    table = flight["raw.ERR"]
+    for time_ns, subsystem, code in zip(
+        table.time_ns.tolist(), table.values("Subsys").tolist(), table.values("ECode").tolist(), strict=True
+    ):
+        if not (np.isfinite(subsystem) and np.isfinite(code)):
+            continue
+        is_switch = int(subsystem) == LANE_SWITCH
+        grade: Grade = "warn" if is_switch else error_grade(int(subsystem), int(code))
+        text = error_name(int(subsystem), int(code))
+        yield Event("switches" if is_switch else "faults", time_ns, grade, text, "raw.ERR")
+
+
+def error_grade(subsystem: int, code: int) -> Grade:
+    """Return the grade of an error code: information where it says that an error is over.
+
+    Examples
+    --------
+    >>> error_grade(6, 1), error_grade(6, 0), error_grade(11, 2)
+    ('fail', 'info', 'warn')
+    """
+    if code == 0 and subsystem != LANE_SWITCH:
+        return "info"
+    return "fail" if subsystem in GRAVE_SUBSYSTEMS else "warn"
+
+
+def _plain_events(flight: Flight) -> Iterator[Event]:
+    if "raw.EV" not in flight or not is_number(flight["raw.EV"], "Id"):
+        return
+    table = flight["raw.EV"]
+    for time_ns, number in zip(table.time_ns.tolist(), table.values("Id").tolist(), strict=True):
+        if not np.isfinite(number):
+            continue
+        kind = int(number)
+        grade: Grade = "fail" if kind in _GRAVE_EVENTS else "warn" if kind in _LIGHT_EVENTS else "info"
+        check = "resets" if kind in _ESTIMATOR_EVENTS else "switches" if kind in _SWITCH_EVENTS else "faults"
+        grade = "warn" if kind in _SWITCH_EVENTS else grade
+        yield Event(check, time_ns, grade, EVENTS.get(kind, f"event {kind}"), "raw.EV")
+
+
+def _modes(flight: Flight) -> Iterator[Event]:
+    """Yield changes of mode; one whose reason is a failsafe is graded so."""
+    if "raw.MODE" not in flight:
+        return
+    table = flight["raw.MODE"]
+    number, reason = named(table, "ModeNum", "Mode"), named(table, "Rsn")
+    if not number:
+        return
+    names = _mode_names(flight)
+    reasons = table.values(reason).tolist() if reason else [np.nan] * len(table)
+    for time_ns, mode, why in zip(table.time_ns.tolist(), table.values(number).tolist(), reasons, strict=True):
+        if not np.isfinite(mode):
+            continue
+        known = int(why) if np.isfinite(why) else -1
+        told = f", reason: {MODE_REASONS[known]}" if known in MODE_REASONS else ""
+        name = names.get(int(mode), f"{mode:.0f}")
+        grade: Grade = "fail" if known in BAD_MODE_REASONS else "info"
+        yield Event("modes" if grade == "info" else "faults", time_ns, grade, f"mode {name}{told}", "raw.MODE")
+
+
+def _mode_names(flight: Flight) -> dict[int, str]:
+    known = MODES.get(flight.metadata.get("vehicle", ""), ())
+    return {number: name for number, name in enumerate(known) if name}
+
+
+def findings(flight: Flight) -> tuple[Finding, ...]:
+    """Return a finding for each kind of warning or failure that was said, with how often and when first.
+
+    Texts that differ in numbers alone are one kind. Beyond ``MOST_TOLD`` kinds the rest is counted.
+    """
+    groups: dict[tuple[str, str], list[Event]] = {}
+    for event in sorted(events(flight), key=lambda one: one.time_ns):
+        if event.grade != "info":
+            groups.setdefault((event.grade, _NUMBER.sub("#", event.text)), []).append(event)
+    ordered = sorted(groups.values(), key=lambda group: (group[0].grade != "fail", group[0].time_ns))
+    told = [_finding(flight, group) for group in ordered[:MOST_TOLD]]
+    if len(ordered) > MOST_TOLD:
+        rest = [event for group in ordered[MOST_TOLD:] for event in group]
+        text = f"{len(rest)} further messages of {len(ordered) - MOST_TOLD} kinds"
+        told.append(Finding("warn", "health.said", text, "event", count=len(rest)))
+    return tuple(told)
+
+
+def _finding(flight: Flight, group: list[Event]) -> Finding:
+    first = group[0]
+    times = "" if len(group) == 1 else f", {len(group)} times"
+    place = f"at {flight.seconds(np.array([first.time_ns]))[0]:.1f} s"
+    return Finding(first.grade, "health.said", f"{first.text}{times}", first.source, place, len(group))
