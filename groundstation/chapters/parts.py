@@ -129,8 +129,9 @@ class Rank(IntEnum):
     GROUND_RUNS = 7
     MAGNETIC_OPEN = 8
     INERTIAL_OPEN = 9  # aided by GNSS, or not known whether
-    LATENCY = 10
-    OTHER = 11
+    GNSS = 10
+    LATENCY = 11
+    OTHER = 12
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ OURS = (  # in the order they are shown
     "groundstation.systems.reference.system",
     "groundstation.systems.cooperative.system",
     "groundstation.systems.planning.system",
+    "groundstation.systems.gnss.system",
 )
 
 
