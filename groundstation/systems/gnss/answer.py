@@ -32,6 +32,7 @@ STATE_NAMES: Mapping[str, str] = MappingProxyType(
 )
 WITHOUT_RECORD = ("no_record", "log_silent")  # between rows: only the receiver is silent, or all of the log
 WITHOUT_FIX = ("dead_reckoning", "integrity_lost", "none")  # rows in them are time lost
+COARSE = 2.0  # times the scatter: a coarser step of the logged places hides it
 
 
 @dataclass(frozen=True)
@@ -99,8 +100,8 @@ class Standstill:
         Values that are independent of each other; 1 where the correlation is not known.
     speed_rms_mps, claimed_mps : float or None
         Speed shown while it stood, and the sigma claimed of the velocity.
-    resolution_m : float or None
-        Step in which positions are logged, where it hides the scatter.
+    resolution_m : float
+        Step in which positions are logged, 0 where none is seen.
     is_held : bool
         The receiver repeats one position: it holds it while it believes to stand.
     """
@@ -117,8 +118,13 @@ class Standstill:
     independent: float
     speed_rms_mps: float | None
     claimed_mps: float | None
-    resolution_m: float | None
+    resolution_m: float
     is_held: bool
+
+    @property
+    def is_coarse(self) -> bool:
+        """Tell whether the step in which positions are logged hides their scatter."""
+        return self.resolution_m > COARSE * self.scatter_m
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,7 @@ def _claim(answer: GnssReception) -> Claim:
         ("C/N0", number(main.cn0_dbhz, 0, "dB-Hz"), "median"),
     ]
     stood = main.standstill
-    if stood is not None and not stood.is_held and stood.resolution_m is None:
+    if stood is not None and not stood.is_held and not stood.is_coarse:
         claimed = "" if stood.claimed_m is None else f"{length_text(stood.claimed_m)} claimed"
         told.append(("Scatter", length_text(stood.scatter_m), claimed))
     figures = tuple(one for one in told if one[1] != "—")
@@ -157,8 +157,7 @@ def _standstill(one: Receiver, answer: GnssReception) -> list[Part | None]:
         ("Stood", f"{clock(stood.start_s)} to {clock(stood.end_s)}", f"{stood.samples} rows, {name_of(stood.state)}")
     ]
     if not stood.is_held:
-        is_coarse = stood.resolution_m is not None
-        seen = f"below {length_text(stood.resolution_m or 0.0)}" if is_coarse else length_text(stood.scatter_m)
+        seen = f"below {length_text(stood.resolution_m)}" if stood.is_coarse else length_text(stood.scatter_m)
         pairs.append(("Horizontal scatter", seen, f"claimed: {_length(stood.claimed_m)}"))
         if stood.up_scatter_m is not None:
             pairs.append(

@@ -150,7 +150,7 @@ def _claims(one: Receiver, settings: GnssSettings) -> list[Judged]:
     if stood is None:
         return []
     place = f"at {stood.start_s:.1f} s"
-    if stood.is_held or stood.resolution_m is not None:
+    if stood.is_held or stood.is_coarse:
         return [Judged("good", memory_of(stood), "held", one.topic, place)]
     found = []
     for scatter, claimed, what in (

@@ -15,12 +15,19 @@ from groundstation.systems.gnss.answer import STATE_NAMES, GnssReception
 from groundstation.systems.gnss.arrays import GnssAveraging, GnssPairs, GnssQuality, GnssStandstill, GnssStates
 
 ROLES: dict[str, Role] = {
-    **dict.fromkeys(("rtk_fixed", "rtk_float", "ppp", "dgnss", "3d", "gnss_ins", "fix"), "good"),
-    **dict.fromkeys(("2d", "other", "dead_reckoning"), "warn"),
+    **dict.fromkeys(("rtk_fixed", "ppp", "dgnss", "3d", "gnss_ins", "fix"), "good"),
+    **dict.fromkeys(("rtk_float", "2d", "other", "dead_reckoning"), "warn"),
     **dict.fromkeys(("integrity_lost", "none"), "bad"),
     **dict.fromkeys(("no_record", "log_silent"), "faint"),
 }
-FLOAT_ROLE: Role = "answer"
+ONE_ALONE = {  # axes that say which of two lines is there
+    ("satellites", "used"): "satellites used",
+    ("satellites", "tracked"): "satellites tracked",
+    ("dilution", "HDOP"): "HDOP",
+    ("dilution", "PDOP"): "PDOP",
+    ("claimed σ, m", "horizontal"): "horizontal σ, m",
+    ("claimed σ, m", "vertical"): "vertical σ, m",
+}
 PANEL_MM, LANE_MM = 24.0, 5.0
 M_PER_CM = 0.01
 
@@ -43,7 +50,7 @@ def states(results: FlightResults) -> Plot | None:
             end=mine.end_s,
             state=np.array([STATE_NAMES.get(name, name) for name in mine.state.tolist()]),
             order=names,
-            roles={STATE_NAMES.get(name, name): _role(name) for name in order},
+            roles={STATE_NAMES.get(name, name): ROLES.get(name, "other") for name in order},
         )
         panel = Panel(
             [lanes],
@@ -65,10 +72,6 @@ def states(results: FlightResults) -> Plot | None:
     )
 
 
-def _role(state: str) -> Role:
-    return FLOAT_ROLE if state == "rtk_float" else ROLES.get(state, "other")
-
-
 def quality(results: FlightResults, topic: str) -> Plot | None:
     """Return satellites, C/N0, dilution, claimed sigmas and age of corrections of one receiver."""
     data = results.rows_of(GnssQuality)
@@ -83,8 +86,8 @@ def quality(results: FlightResults, topic: str) -> Plot | None:
             "claimed σ, m",
             (("horizontal", mine.horizontal_sigma_m, "gnss"), ("vertical", mine.vertical_sigma_m, "series 1")),
         ),
-        ("claimed σ of velocity, m/s", (("velocity", mine.velocity_sigma_mps, "gnss"),)),
-        ("age of corrections, s", (("age", mine.age_of_corrections_s, "gnss"),)),
+        ("σ of velocity, m/s", (("velocity", mine.velocity_sigma_mps, "gnss"),)),
+        ("age, s", (("age", mine.age_of_corrections_s, "gnss"),)),
     )
     shown = [(title, [line for line in lines if has_values(line[1])]) for title, lines in panels]
     shown = [(title, lines) for title, lines in shown if lines]
@@ -96,14 +99,16 @@ def quality(results: FlightResults, topic: str) -> Plot | None:
         marks = []
         for name, values, role in lines:
             x, y = broken_at_gaps(mine.time_s, values)
-            marks.append(Curve(x=x, y=y, role=role, name=name))
+            marks.append(Curve(x=x, y=y, role=role, name=name if len(lines) > 1 else ""))
+        axis = ONE_ALONE.get((title, lines[0][0]), title) if len(lines) == 1 else title
         most = finite(*(values for _name, values, _role in lines))
-        panel = Panel(marks, ends, Axis(title, low=_low(title, most), high=_high(most)), legend=_legend(lines))
+        panel = Panel(marks, ends, Axis(axis, low=_low(title, most), high=_high(most)), legend=_legend(lines))
         rows.append(Row((panel,), PANEL_MM, shares_x=title != shown[-1][0]))
     return Plot(
         f"gnss.quality.{topic}",
         "Satellites, signals and claimed accuracy",
-        "As the receiver states them; what it does not log is left out. A few high values may leave the panel.",
+        "As the receiver states them: σ as it claims it, age of the corrections. What it does not log is left out. A "
+        "few high values may leave a panel.",
         "Satellites, signal strength, dilution and claimed sigmas over flight time.",
         tuple(rows),
         ("gnss_quality",),
@@ -122,7 +127,7 @@ def _high(values: Floats) -> float:
     """Return the upper end of an axis: a few far values may leave it."""
     most = float(values.max())
     usual = float(np.quantile(values, 0.99))
-    return 1.1 * max(most if most < 3.0 * usual else usual, 1e-3)
+    return 1.1 * (most if most < 3.0 * usual else usual) or 1.0
 
 
 def standstill(results: FlightResults, topic: str) -> Plot | None:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray
-from groundstation.systems.gnss.answer import Standstill
+from groundstation.systems.gnss.answer import COARSE, Standstill
 from groundstation.systems.gnss.series import Series
 from groundstation.systems.gnss.settings import GnssSettings
 from groundstation.systems.gnss.spells import known
@@ -18,7 +18,6 @@ IN_MOTION = ("take-off run", "airborne", "landing roll")
 CREEP = 0.2  # of the speed that stands: the mean over the whole of it may be no more
 MOVED_SIGMAS, LEAST_MOVED_M = 4.0, 0.02  # a place that moves by more than its claimed sigma allows does not stand
 LEAST_AVERAGES = 4  # means of one length that make a scatter
-COARSE = 2.0  # times the scatter: a coarser step of the logged places hides it
 HELD_SHARE = 0.9  # share of rows at the place of the row before: the receiver repeats it
 
 
@@ -133,7 +132,7 @@ def _judged(one: Series, rows: NDArray[np.intp]) -> Stood:
         independent=independent,
         speed_rms_mps=known(float(np.sqrt(np.nanmean(speed**2)))) if np.isfinite(speed).any() else None,
         claimed_mps=_median(one.table.values("velocity_sigma_mps")[rows]),
-        resolution_m=resolution_m if is_coarse else None,
+        resolution_m=resolution_m,
         is_held=is_held,
     )
     return Stood(answer, rows, offset, averaged_s, scatter)

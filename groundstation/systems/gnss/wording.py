@@ -7,6 +7,7 @@ from groundstation.tables.sources import NEVER_A_FIX
 
 FIXED = frozenset(STATE_NAMES) - {*WITHOUT_FIX, *WITHOUT_RECORD}
 WHOLE = 0.9995  # share that is all
+STEP_TOLD = 0.5  # of the scatter: a coarser step of the logged places is told
 FEW = 4  # states that the sentence names
 CENTIMETRES_BELOW_M = 0.995
 
@@ -67,7 +68,7 @@ def scatter_of(stood: Standstill) -> str:
     if stood.is_held:
         return ""
     claimed = "" if stood.claimed_m is None else f" where {length_text(stood.claimed_m)} is claimed"
-    if stood.resolution_m is not None:
+    if stood.is_coarse:
         return f"scatter below {length_text(stood.resolution_m)}{claimed}"
     return f"scatter {length_text(stood.scatter_m)}{claimed}"
 
@@ -77,9 +78,9 @@ def memory_of(stood: Standstill) -> str:
     length_s = stood.end_s - stood.start_s
     if stood.is_held:
         return "the receiver repeats one position while it stands: its scatter says nothing"
-    if stood.resolution_m is not None:
-        step = length_text(stood.resolution_m)
-        return f"places are logged in steps of {step}: finer scatter is not seen"
+    step = f"places are logged in steps of {length_text(stood.resolution_m)}"
+    if stood.is_coarse:
+        return f"{step}: finer scatter is not seen"
     if stood.correlation_s is None:
         return (
             f"it stood for {seconds_text(length_s)} and errors last longer than {seconds_text(length_s / 4.0)}: "
@@ -88,7 +89,7 @@ def memory_of(stood: Standstill) -> str:
     return (
         f"it stood for {seconds_text(length_s)}, errors last about {seconds_text(stood.correlation_s)}: "
         f"{stood.independent:.0f} independent value{'s' * (round(stood.independent) != 1)}"
-    )
+    ) + (f"; {step}" if stood.resolution_m > STEP_TOLD * stood.scatter_m else "")
 
 
 def name_of(state: str) -> str:
