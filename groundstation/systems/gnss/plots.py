@@ -72,6 +72,12 @@ def states(results: FlightResults) -> Plot | None:
     )
 
 
+def _of(results: FlightResults, topic: str) -> str:
+    """Return the name of a receiver behind a title, where there are several."""
+    answer = results.answer(GnssReception)
+    return f" of {topic}" if answer is not None and len(answer.receivers) > 1 else ""
+
+
 def quality(results: FlightResults, topic: str) -> Plot | None:
     """Return satellites, C/N0, dilution, claimed sigmas and age of corrections of one receiver."""
     data = results.rows_of(GnssQuality)
@@ -86,8 +92,8 @@ def quality(results: FlightResults, topic: str) -> Plot | None:
             "claimed σ, m",
             (("horizontal", mine.horizontal_sigma_m, "gnss"), ("vertical", mine.vertical_sigma_m, "series 1")),
         ),
-        ("σ of velocity, m/s", (("velocity", mine.velocity_sigma_mps, "gnss"),)),
-        ("age, s", (("age", mine.age_of_corrections_s, "gnss"),)),
+        ("velocity σ, m/s", (("velocity", mine.velocity_sigma_mps, "gnss"),)),
+        ("correction age, s", (("age", mine.age_of_corrections_s, "gnss"),)),
     )
     shown = [(title, [line for line in lines if has_values(line[1])]) for title, lines in panels]
     shown = [(title, lines) for title, lines in shown if lines]
@@ -106,7 +112,7 @@ def quality(results: FlightResults, topic: str) -> Plot | None:
         rows.append(Row((panel,), PANEL_MM, shares_x=title != shown[-1][0]))
     return Plot(
         f"gnss.quality.{topic}",
-        "Satellites, signals and claimed accuracy",
+        f"Satellites, signals and claimed accuracy{_of(results, topic)}",
         "As the receiver states them: σ as it claims it, age of the corrections. What it does not log is left out. A "
         "few high values may leave a panel.",
         "Satellites, signal strength, dilution and claimed sigmas over flight time.",
@@ -161,7 +167,7 @@ def standstill(results: FlightResults, topic: str) -> Plot | None:
         panels.append(_averaging(means.where(means.topic == topic), stood.claimed_m, scale, unit))
     return Plot(
         f"gnss.standstill.{topic}",
-        "Scatter at standstill",
+        f"Scatter at standstill{_of(results, topic)}",
         "Left: positions about their mean, and the σ claimed along each axis. Right: scatter of means over a time. "
         "Errors without memory fall along the grey line; where the dots stay above it, errors last, and the scatter "
         "of a short standstill understates them.",
@@ -196,7 +202,7 @@ def steps(results: FlightResults, topic: str) -> Plot | None:
     y = Axis("step beyond velocity, m", low=0.0, high=1.08 * max(float(known.max()), 1e-3))
     return Plot(
         f"gnss.steps.{topic}",
-        "Position against velocity",
+        f"Steps of the position{_of(results, topic)}",
         "Size of each step of the position less the one that the velocity gives; without velocities, less the step "
         "before it. A jump stands out.",
         "Steps of the position beyond the velocity over flight time.",

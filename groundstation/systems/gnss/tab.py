@@ -38,7 +38,7 @@ def gnss(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     over_time: list[rrb.View | rrb.Container] = [*lanes]
     if pages:
         over_time.append(rrb.Tabs(contents=pages, active_tab=0) if len(pages) > 1 else pages[0])
-    shares = [1.0] * len(lanes) + ([4.0] if pages else [])
+    shares = [1.0] * len(lanes) + ([5.0] if pages else [])
     text = document("What was found", "gnss/answer")
     columns: list[rrb.View | rrb.Container] = [rrb.Vertical(contents=over_time, row_shares=shares), text]
     return rrb.Horizontal(contents=columns, column_shares=[3.0, 2.0], name="GNSS")
