@@ -38,7 +38,8 @@ from groundstation.cli.application import (
     time_bound,
 )
 
-PURPOSES = "heading|inertial|magnetic|landing|cooperative"  # analyses that have an ``examine``; a test compares them
+# Analyses that have an ``examine``; a test compares them.
+PURPOSES = "heading|inertial|magnetic|landing|gnss|cooperative"
 
 
 @app.command(epilog=examples("info"))

@@ -99,9 +99,10 @@ def navsatfix(values: Values) -> Columns:
 
 
 def _fix(values: Values) -> Column:
-    """Return the kind of the fix: -1 none, 0 a fix, from 1 on corrected by satellites or from the ground.
+    """Return the kind of the fix by its status.
 
-    Drivers state RTK as corrected from the ground (2), so ``dgnss`` may be better than it says. -2 is unknown.
+    -1 is none, 0 a fix, 1 one corrected by satellites, 2 from the ground. Drivers state RTK as corrected from the
+    ground (2), so ``dgnss`` may be better than it says. -2 is unknown.
     """
     status = values["status.status"]
     return Column(np.select([status < 0.0, status < 1.0], ["none", "3d"], "dgnss"), status >= -1.0)

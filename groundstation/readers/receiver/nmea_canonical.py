@@ -223,7 +223,10 @@ def _signals(epochs: Epochs) -> Columns:
 
 
 def _age(epochs: Epochs, fix: Column) -> Columns:
-    """Return the age of the corrections by GGA or GNS, where a fix uses them: else it is a filler."""
+    """Return the age of the corrections by GGA or GNS.
+
+    Without a fix that uses them it is a filler.
+    """
     corrected = fix.mask & np.isin(fix.values, ("dgnss", "rtk_float", "rtk_fixed"))
     columns: Columns = {}
     for formatter in ("GNS", "GGA"):

@@ -39,7 +39,10 @@ def signals(block: Block, family: str, fields: Mapping[str, NDArray[Any]]) -> Co
 
 
 def _of(block: Block, name: str) -> tuple[Int64Array, FloatArray, FloatArray] | None:
-    """Return time of the week (ms), satellites tracked and mean C/N0 of each message; None without any."""
+    """Return time of the week (ms), satellites tracked and mean C/N0 of each message.
+
+    None without any message.
+    """
     messages, fields = block.get(name), block.fields(name)
     if messages is None or fields is None or messages.layout is None or messages.layout.group is None:
         return None

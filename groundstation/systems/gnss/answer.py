@@ -36,7 +36,7 @@ COARSE = 2.0  # times the scatter: a coarser step of the logged places hides it
 
 
 @dataclass(frozen=True)
-class State:
+class FixState:
     """Time that a receiver spent in a state: seconds, share of its time, spells, the longest."""
 
     state: str
@@ -47,10 +47,11 @@ class State:
 
 
 @dataclass(frozen=True)
-class Loss:
-    """Time without a fix after the first one; in ``no_record`` and ``log_silent`` without a row.
+class FixLoss:
+    """Time without a fix after the first one, or without a row.
 
-    Speeds are those of the last fix before and of the first one after it; ``moved_m`` is between these.
+    The latter is ``no_record`` or ``log_silent``. Speeds are those of the last fix before and of the first one after
+    it; ``moved_m`` is between these.
     """
 
     state: str
@@ -63,7 +64,7 @@ class Loss:
 
 
 @dataclass(frozen=True)
-class Jump:
+class PositionJump:
     """Step of the position that the velocity does not explain.
 
     ``along_m`` is its part along the motion; ``time_shift_s`` is set where all of it is along a fast motion: then the
@@ -80,7 +81,7 @@ class Jump:
 
 
 @dataclass(frozen=True)
-class Standstill:
+class StandstillScatter:
     """Scatter of positions and velocities while the vehicle stood, beside the sigmas claimed.
 
     Parameters
@@ -128,10 +129,11 @@ class Standstill:
 
 
 @dataclass(frozen=True)
-class Motion:
-    """Velocity against differenced position; ``left_rms_mps`` is what the delay does not explain.
+class VelocityAgainstPosition:
+    """Velocity against differenced position.
 
-    ``lag_s`` positive: the velocity is later than the position by so much; None where the motion does not tell.
+    ``left_rms_mps`` is what the delay does not explain. ``lag_s`` positive: the velocity is later than the position
+    by so much; None where the motion does not tell.
     """
 
     seconds: float
@@ -143,7 +145,7 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class Receiver:
+class GnssReceiver:
     """Reception of one receiver.
 
     Medians and shares are of time with a fix; ``*_low`` and ``*_high`` leave one twentieth of the time beyond them.
@@ -160,12 +162,12 @@ class Receiver:
     missed_epochs: int | None
     is_kind_logged: bool
     placeless_rows: int
-    states: tuple[State, ...]
+    states: tuple[FixState, ...]
     first_fix_s: float | None
     fix_share: float
     lost_s: float
     silent_s: float
-    losses: tuple[Loss, ...]
+    losses: tuple[FixLoss, ...]
     satellites_used: float | None
     satellites_used_low: float | None
     satellites_tracked: float | None
@@ -180,9 +182,9 @@ class Receiver:
     horizontal_sigma_m: float | None
     vertical_sigma_m: float | None
     velocity_sigma_mps: float | None
-    standstill: Standstill | None
-    motion: Motion | None
-    jumps: tuple[Jump, ...]
+    standstill: StandstillScatter | None
+    motion: VelocityAgainstPosition | None
+    jumps: tuple[PositionJump, ...]
     jumps_found: int
     behind_ins_s: float | None
     behind_ins_sigma_s: float | None
@@ -202,7 +204,7 @@ class Receiver:
 
 
 @dataclass(frozen=True)
-class Pair:
+class ReceiverPair:
     """Second receiver against the first, where both had a fix.
 
     ``distance_m`` is the median distance of their places in the plane, ``distance_scatter_m`` its scatter: of two
@@ -239,12 +241,12 @@ class GnssReception(Answer):
     sentence: str
     reasons: tuple[str, ...]
     main: str
-    receivers: tuple[Receiver, ...]
-    pairs: tuple[Pair, ...] = ()
+    receivers: tuple[GnssReceiver, ...]
+    pairs: tuple[ReceiverPair, ...] = ()
     settings: dict[str, Any] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
 
     @property
-    def receiver(self) -> Receiver:
+    def receiver(self) -> GnssReceiver:
         """The one of which the sentence speaks."""
         return next(one for one in self.receivers if one.topic == self.main)

@@ -10,14 +10,14 @@ from groundstation.results.flight import FlightResults
 from groundstation.systems.gnss.answer import (
     WITHOUT_FIX,
     WITHOUT_RECORD,
+    FixLoss,
+    GnssReceiver,
     GnssReception,
     Grade,
-    Jump,
-    Loss,
-    Pair,
-    Receiver,
+    PositionJump,
+    ReceiverPair,
 )
-from groundstation.systems.gnss.wording import length_text, memory_of, name_of, seconds_text, share_text
+from groundstation.systems.gnss.wording_answer import length_text, memory_of, name_of, seconds_text, share_text
 
 TITLE = "GNSS reception"
 LEAD = "What the receiver had over time, how good it was, and where it was lost."
@@ -97,8 +97,8 @@ def _quality(answer: GnssReception) -> Grid:
     return Grid("Quality", heads, rows, caption, ("gnss_quality",))
 
 
-def _with_tail(name: str, tail: str, places: int, unit: str = "") -> Callable[[Receiver], str]:
-    def told(one: Receiver) -> str:
+def _with_tail(name: str, tail: str, places: int, unit: str = "") -> Callable[[GnssReceiver], str]:
+    def told(one: GnssReceiver) -> str:
         value, beyond = getattr(one, name), getattr(one, tail)
         if value is None:
             return NOT_LOGGED
@@ -111,13 +111,13 @@ def _length(value: float | None) -> str:
     return NOT_LOGGED if value is None else length_text(value)
 
 
-def _behind_ins(one: Receiver) -> str:
+def _behind_ins(one: GnssReceiver) -> str:
     if one.behind_ins_s is None:
         return "not observed"
     return f"{number(one.behind_ins_s, 3, 's', signed=True)} ± {number(one.behind_ins_sigma_s, 3, 's')}"
 
 
-QUALITY: tuple[tuple[str, Callable[[Receiver], str]], ...] = (
+QUALITY: tuple[tuple[str, Callable[[GnssReceiver], str]], ...] = (
     ("Rows", lambda one: number(one.rows, 0)),
     ("Repeated times", lambda one: number(one.repeated_rows, 0)),
     ("Rate", lambda one: number(one.rate_hz, 2, "Hz")),
@@ -145,11 +145,11 @@ QUALITY: tuple[tuple[str, Callable[[Receiver], str]], ...] = (
 )
 
 
-def _of(one: Receiver, answer: GnssReception) -> str:
+def _of(one: GnssReceiver, answer: GnssReception) -> str:
     return f" of {one.topic}" if len(answer.receivers) > 1 else ""
 
 
-def _standstill(one: Receiver, answer: GnssReception) -> list[Part | None]:
+def _standstill(one: GnssReceiver, answer: GnssReception) -> list[Part | None]:
     stood = one.standstill
     if stood is None:
         return []
@@ -172,7 +172,7 @@ def _standstill(one: Receiver, answer: GnssReception) -> list[Part | None]:
     ]
 
 
-def _motion(one: Receiver, answer: GnssReception) -> list[Part | None]:
+def _motion(one: GnssReceiver, answer: GnssReception) -> list[Part | None]:
     motion = one.motion
     if motion is None:
         return [Figure("gnss.steps", of=one.topic)]
@@ -192,7 +192,7 @@ def _motion(one: Receiver, answer: GnssReception) -> list[Part | None]:
 
 
 def _losses(answer: GnssReception) -> Part | None:
-    rows: list[tuple[str, Loss]] = [(one.topic, loss) for one in answer.receivers for loss in one.losses]
+    rows: list[tuple[str, FixLoss]] = [(one.topic, loss) for one in answer.receivers for loss in one.losses]
     if not rows:
         return None
     longest = sorted(sorted(rows, key=lambda row: -row[1].seconds)[:MOST_ROWS], key=lambda row: row[1].start_s)
@@ -212,7 +212,7 @@ def _losses(answer: GnssReception) -> Part | None:
 
 
 def _jumps(answer: GnssReception) -> Part | None:
-    rows: list[tuple[str, Jump]] = [(one.topic, jump) for one in answer.receivers for jump in one.jumps]
+    rows: list[tuple[str, PositionJump]] = [(one.topic, jump) for one in answer.receivers for jump in one.jumps]
     if not rows:
         return None
     largest = sorted(sorted(rows, key=lambda row: -row[1].size_m)[:MOST_ROWS], key=lambda row: row[1].time_s)
@@ -241,7 +241,7 @@ def _most(count: int, which: str) -> str:
     return f"The {which} {MOST_ROWS} of {count}." if count > MOST_ROWS else ""
 
 
-def _pair(pair: Pair) -> Facts:
+def _pair(pair: ReceiverPair) -> Facts:
     claimed = NOT_LOGGED if pair.claimed_m is None else length_text(pair.claimed_m)
     pairs: list[tuple[str, str, str]] = [
         (

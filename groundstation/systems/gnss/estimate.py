@@ -12,16 +12,16 @@ from groundstation.base.findings import Finding
 from groundstation.base.signals import kind_of, topics_of_kind
 from groundstation.results.figures import FigureData
 from groundstation.results.roles import Delay, Delays
-from groundstation.systems.gnss.answer import WITHOUT_FIX, WITHOUT_RECORD, GnssReception, Receiver
+from groundstation.systems.gnss.answer import WITHOUT_FIX, WITHOUT_RECORD, GnssReceiver, GnssReception
 from groundstation.systems.gnss.arrays import GnssAveraging, GnssPairs, GnssQuality, GnssStandstill, GnssStates
 from groundstation.systems.gnss.judge import Judged, judge, judge_pair, worst_of
 from groundstation.systems.gnss.motion import Steps, steps_of
-from groundstation.systems.gnss.pairs import Compared, compare
-from groundstation.systems.gnss.series import Series, series_of
+from groundstation.systems.gnss.pairs import ComparedReceivers, compare
+from groundstation.systems.gnss.series import ReceiverRows, series_of
 from groundstation.systems.gnss.settings import GnssSettings
 from groundstation.systems.gnss.spells import Spells, losses_of, seconds_after_first_fix, spells_of, states_of
 from groundstation.systems.gnss.standstill import Stood, standstill_of
-from groundstation.systems.gnss.wording import never_had, sentence_of
+from groundstation.systems.gnss.wording_answer import never_had, sentence_of
 from groundstation.tables.phases import Phases
 from groundstation.tables.sources import sources_of_kind
 from groundstation.tables.table import Flight
@@ -36,11 +36,11 @@ NEVER_ZERO = ("satellites_used", "satellites_tracked", "hdop", "pdop")  # zero t
 class One(NamedTuple):
     """A receiver with the workings behind its answer."""
 
-    rows: Series
+    rows: ReceiverRows
     spells: Spells
     stood: Stood | None
     steps: Steps
-    answer: Receiver
+    answer: GnssReceiver
 
 
 class Reception(NamedTuple):
@@ -103,7 +103,7 @@ def _named(reason: Judged, receivers: int) -> str:
     return f"{reason.topic}: {reason.text}" if receivers > 1 else reason.text
 
 
-def _sentence(every: Sequence[Receiver], main: Receiver) -> str:
+def _sentence(every: Sequence[GnssReceiver], main: GnssReceiver) -> str:
     """Return the sentence of the main receiver, and that another one never had a fix."""
     if len(every) == 1:
         return sentence_of(main)
@@ -136,7 +136,7 @@ def _one(
     cn0, hdop, pdop = _values(rows, "cn0_dbhz"), _values(rows, "hdop"), _values(rows, "pdop")
     age = rows.values("age_of_corrections_s")
     delay = _delay(flight, topic, delays)
-    answer = Receiver(
+    answer = GnssReceiver(
         topic=topic,
         start_s=float(rows.time_s[0]),
         end_s=float(rows.time_s[-1]),
@@ -176,25 +176,31 @@ def _one(
     return One(rows, spells, stood, steps, answer)
 
 
-def _share_with_fix(rows: Series, spells: Spells) -> float:
+def _share_with_fix(rows: ReceiverRows, spells: Spells) -> float:
     whole_s = float(spells.seconds.sum())
     return float(rows.held_s[rows.has_fix].sum()) / whole_s if whole_s > 0.0 else float(rows.has_fix.mean())
 
 
-def _values(rows: Series, name: str) -> FloatArray:
-    """Values while there is a fix; none where a driver that does not know them leaves zero throughout."""
+def _values(rows: ReceiverRows, name: str) -> FloatArray:
+    """Values while there is a fix.
+
+    None where a driver that does not know them leaves zero throughout.
+    """
     values = rows.values(name)
     known = values[np.isfinite(values)]
     return np.full(len(values), np.nan) if name in NEVER_ZERO and not known.any() else values
 
 
-def _most(rows: Series, name: str) -> float | None:
+def _most(rows: ReceiverRows, name: str) -> float | None:
     values = rows.table.values(name)
     return float(np.nanmax(values)) if np.isfinite(values).any() else None
 
 
-def _quantile(rows: Series, values: FloatArray, share: float) -> float | None:
-    """Value below which the rows stand for a share of the known time; None where nothing is known."""
+def _quantile(rows: ReceiverRows, values: FloatArray, share: float) -> float | None:
+    """Value below which the rows stand for a share of the known time.
+
+    None where nothing is known.
+    """
     known = np.flatnonzero(np.isfinite(values))
     if not known.size:
         return None
@@ -215,7 +221,7 @@ def _delay(flight: Flight, topic: str, delays: Delays | None) -> Delay | None:
     return next((one for one in found if one is not None), None)
 
 
-def _figures(found: Sequence[One], pairs: Sequence[Compared]) -> tuple[FigureData, ...]:
+def _figures(found: Sequence[One], pairs: Sequence[ComparedReceivers]) -> tuple[FigureData, ...]:
     figures: list[FigureData] = [
         GnssStates(
             topic=np.concatenate([np.full(len(one.spells.state), one.rows.topic) for one in found]),
@@ -260,7 +266,7 @@ def _quality(found: Sequence[One]) -> GnssQuality:
     )
 
 
-def _standstill(stood: Sequence[tuple[Series, Stood]]) -> GnssStandstill:
+def _standstill(stood: Sequence[tuple[ReceiverRows, Stood]]) -> GnssStandstill:
     kept = [(rows, one, _thinned(len(one.rows))) for rows, one in stood]
     offset = np.concatenate([one.offset_m[some] for _rows, one, some in kept])
     return GnssStandstill(
@@ -272,7 +278,7 @@ def _standstill(stood: Sequence[tuple[Series, Stood]]) -> GnssStandstill:
     )
 
 
-def _averaging(stood: Sequence[tuple[Series, Stood]]) -> GnssAveraging:
+def _averaging(stood: Sequence[tuple[ReceiverRows, Stood]]) -> GnssAveraging:
     whole = [one.scatter_m[:1].repeat(len(one.averaged_s)) for _rows, one in stood]
     steps = [one.averaged_s / one.averaged_s[:1] if len(one.averaged_s) else one.averaged_s for _rows, one in stood]
     return GnssAveraging(
@@ -283,7 +289,7 @@ def _averaging(stood: Sequence[tuple[Series, Stood]]) -> GnssAveraging:
     )
 
 
-def _pairs(pairs: Sequence[Compared]) -> GnssPairs:
+def _pairs(pairs: Sequence[ComparedReceivers]) -> GnssPairs:
     kept = [(one, _thinned(len(one.time_s))) for one in pairs]
     place = np.concatenate([one.place_m[rows] for one, rows in kept])
     velocity = np.concatenate([one.velocity_mps[rows] for one, rows in kept])

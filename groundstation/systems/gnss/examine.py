@@ -1,10 +1,10 @@
-"""What a log lacks for a full answer on its GNSS reception."""
+"""Shortfalls of a log for a full answer on its GNSS reception."""
 
 from groundstation.systems.analysis import Shortfall
-from groundstation.systems.gnss.answer import WITHOUT_FIX, Receiver
+from groundstation.systems.gnss.answer import WITHOUT_FIX, GnssReceiver
 from groundstation.systems.gnss.estimate import reception_of
 from groundstation.systems.gnss.settings import GnssSettings
-from groundstation.systems.gnss.wording import never_had
+from groundstation.systems.gnss.wording_answer import never_had
 from groundstation.tables.phases import Phases
 from groundstation.tables.table import Flight
 
@@ -31,7 +31,7 @@ def shortfalls_of(flight: Flight, phases: Phases, settings: GnssSettings) -> tup
     return tuple(found)
 
 
-def not_logged(one: Receiver) -> tuple[str, ...]:
+def not_logged(one: GnssReceiver) -> tuple[str, ...]:
     """Return what would tell of a receiver's reception and is not logged, in words."""
     told = {
         "kind of fix": one.is_kind_logged or None,

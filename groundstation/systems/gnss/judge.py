@@ -5,10 +5,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.findings import Finding, Severity
-from groundstation.systems.gnss.answer import WITHOUT_FIX, Grade, Loss, Pair, Receiver
-from groundstation.systems.gnss.series import Series
+from groundstation.systems.gnss.answer import WITHOUT_FIX, FixLoss, GnssReceiver, Grade, ReceiverPair
+from groundstation.systems.gnss.series import ReceiverRows
 from groundstation.systems.gnss.settings import GnssSettings
-from groundstation.systems.gnss.wording import length_text, memory_of, name_of, never_had, seconds_text, share_text
+from groundstation.systems.gnss.wording_answer import (
+    length_text,
+    memory_of,
+    name_of,
+    never_had,
+    seconds_text,
+    share_text,
+)
 
 GRADES: tuple[Grade, ...] = ("unknown", "good", "warn", "bad")
 APART_SIGMAS = 3.0  # times the claimed sigma that the distance of two antennas may scatter
@@ -17,7 +24,7 @@ LATE_S = 0.1  # a delay between position and velocity that is worth a line
 
 @dataclass(frozen=True)
 class Judged:
-    """A reason, its grade, and the finding it becomes; grade ``good`` is worth a line alone."""
+    """Reason with its grade and the finding it becomes; grade ``good`` is worth a line alone."""
 
     grade: Grade
     text: str
@@ -33,7 +40,7 @@ class Judged:
         return Finding(severity, f"gnss.{self.code}", self.text, self.topic, self.place, self.count)
 
 
-def judge(one: Receiver, rows: Series, settings: GnssSettings, is_main: bool) -> list[Judged]:
+def judge(one: GnssReceiver, rows: ReceiverRows, settings: GnssSettings, is_main: bool) -> list[Judged]:
     """Judge one receiver; what another one lacks is at most a warning."""
     if one.first_fix_s is None:
         return [Judged("bad" if is_main else "warn", never_had(one), "never_a_fix", one.topic)]
@@ -45,7 +52,7 @@ def _at_most_warn(grade: Grade) -> Grade:
     return "warn" if grade == "bad" else grade
 
 
-def _fix(one: Receiver, settings: GnssSettings) -> list[Judged]:
+def _fix(one: GnssReceiver, settings: GnssSettings) -> list[Judged]:
     found = []
     assert one.first_fix_s is not None
     waited_s = one.first_fix_s - one.start_s
@@ -76,7 +83,7 @@ def _fix(one: Receiver, settings: GnssSettings) -> list[Judged]:
     return found
 
 
-def _lost(one: Receiver, settings: GnssSettings) -> list[Judged]:
+def _lost(one: GnssReceiver, settings: GnssSettings) -> list[Judged]:
     losses = [loss for loss in one.losses if loss.state in WITHOUT_FIX]
     share = one.share_after_first_fix(*WITHOUT_FIX) if one.lost_s > 0.0 else 0.0
     share = min(share, one.lost_s / max(one.end_s - (one.first_fix_s or 0.0), 1e-9))
@@ -90,8 +97,11 @@ def _lost(one: Receiver, settings: GnssSettings) -> list[Judged]:
     return [Judged(grade, text, "lost", one.topic, place, len(losses))]
 
 
-def _silent(one: Receiver, settings: GnssSettings) -> list[Judged]:
-    """Judge gaps of the receiver's rows; where the whole log is silent it is not the receiver's."""
+def _silent(one: GnssReceiver, settings: GnssSettings) -> list[Judged]:
+    """Judge gaps of the receiver's rows.
+
+    Where the whole log is silent they are not the receiver's.
+    """
     gaps = [loss for loss in one.losses if loss.state == "no_record"]
     if not gaps:
         return []
@@ -104,11 +114,11 @@ def _silent(one: Receiver, settings: GnssSettings) -> list[Judged]:
     return [Judged(grade, text, "silent", one.topic, f"at {longest.start_s:.1f} s", len(gaps))]
 
 
-def _speed(loss: Loss) -> str:
+def _speed(loss: FixLoss) -> str:
     return "" if loss.speed_before_mps is None else f", at {loss.speed_before_mps:.1f} m/s before"
 
 
-def _geometry(one: Receiver, rows: Series, settings: GnssSettings) -> list[Judged]:
+def _geometry(one: GnssReceiver, rows: ReceiverRows, settings: GnssSettings) -> list[Judged]:
     found = []
     limits = (
         ("satellites_used", "satellites", -1.0, settings.satellites_warn, settings.satellites_bad),
@@ -145,7 +155,7 @@ def _limits(settings: GnssSettings, warn: float, bad: float) -> tuple[tuple[Grad
     )
 
 
-def _claims(one: Receiver, settings: GnssSettings) -> list[Judged]:
+def _claims(one: GnssReceiver, settings: GnssSettings) -> list[Judged]:
     stood = one.standstill
     if stood is None:
         return []
@@ -167,7 +177,7 @@ def _claims(one: Receiver, settings: GnssSettings) -> list[Judged]:
     return found
 
 
-def _motion(one: Receiver, settings: GnssSettings) -> list[Judged]:
+def _motion(one: GnssReceiver, settings: GnssSettings) -> list[Judged]:
     found = []
     if one.motion is not None and one.motion.left_rms_mps > settings.velocity_apart_mps:
         text = f"velocity and position tell different motions: they differ by {one.motion.left_rms_mps:.1f} m/s RMS"
@@ -190,7 +200,7 @@ def _motion(one: Receiver, settings: GnssSettings) -> list[Judged]:
     return found
 
 
-def judge_pair(pair: Pair) -> list[Judged]:
+def judge_pair(pair: ReceiverPair) -> list[Judged]:
     """Judge two receivers against each other: the distance of two antennas is constant."""
     told = f"{pair.second} from {pair.first}: {length_text(pair.distance_m)}"
     claimed = pair.claimed_m
@@ -200,8 +210,11 @@ def judge_pair(pair: Pair) -> list[Judged]:
     return [Judged("good", f"{told} apart, ± {length_text(pair.distance_scatter_m)}", "second_receiver", pair.second)]
 
 
-def worst_of(judged: list[Judged], main: Receiver) -> Grade:
-    """Return the worst grade; unknown where nothing is wrong and nothing that would tell is logged."""
+def worst_of(judged: list[Judged], main: GnssReceiver) -> Grade:
+    """Return the worst grade.
+
+    Unknown where nothing is wrong and nothing that would tell is logged.
+    """
     grades: list[Grade] = ["good", *(one.grade for one in judged)]
     worst = max(grades, key=GRADES.index)
     told = (main.satellites_used, main.hdop, main.pdop, main.horizontal_sigma_m, main.velocity_sigma_mps)

@@ -1,4 +1,4 @@
-"""Position against velocity of a receiver: jumps, difference, and the delay between the two."""
+"""Position against velocity of a receiver: jumps, difference, delay between the two."""
 
 from typing import NamedTuple
 
@@ -6,8 +6,8 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray
-from groundstation.systems.gnss.answer import Jump, Motion
-from groundstation.systems.gnss.series import Series
+from groundstation.systems.gnss.answer import PositionJump, VelocityAgainstPosition
+from groundstation.systems.gnss.series import ReceiverRows
 from groundstation.systems.gnss.settings import GnssSettings
 from groundstation.systems.gnss.spells import known
 
@@ -27,12 +27,12 @@ class Steps(NamedTuple):
     """
 
     beyond_m: FloatArray
-    answer: Motion | None
-    jumps: tuple[Jump, ...]
+    answer: VelocityAgainstPosition | None
+    jumps: tuple[PositionJump, ...]
     jumps_found: int
 
 
-def steps_of(one: Series, settings: GnssSettings) -> Steps:
+def steps_of(one: ReceiverRows, settings: GnssSettings) -> Steps:
     """Compare each step of the position with the mean velocity of its ends.
 
     Without velocities, with the step before it: then only jumps are found.
@@ -60,7 +60,9 @@ def steps_of(one: Series, settings: GnssSettings) -> Steps:
     return Steps(beyond, answer, jumps, found)
 
 
-def _motion(one: Series, beyond_m: FloatArray, step_s: FloatArray, usable: BoolArray, settings: GnssSettings) -> Motion:
+def _motion(
+    one: ReceiverRows, beyond_m: FloatArray, step_s: FloatArray, usable: BoolArray, settings: GnssSettings
+) -> VelocityAgainstPosition:
     """Return the difference in velocity, and the delay that explains it by the accelerations.
 
     A velocity that is late by ``lag`` misses ``lag * acceleration``.
@@ -77,7 +79,7 @@ def _motion(one: Series, beyond_m: FloatArray, step_s: FloatArray, usable: BoolA
     left = difference[kept] - (lag_s if is_known else 0.0) * acceleration[kept]
     claimed = one.values("velocity_sigma_mps")
     claimed = claimed[np.isfinite(claimed)]
-    return Motion(
+    return VelocityAgainstPosition(
         seconds,
         rms,
         float(np.sqrt(np.mean(np.sum(left**2, axis=1)))) if len(left) else rms,
@@ -88,7 +90,9 @@ def _motion(one: Series, beyond_m: FloatArray, step_s: FloatArray, usable: BoolA
 
 
 def slope(x: FloatArray, y: FloatArray) -> tuple[float, float]:
-    """Return the slope of a line through zero, and its sigma; neighbours count as one value in four.
+    """Return the slope of a line through zero, and its sigma.
+
+    Four neighbours count as one value.
 
     Examples
     --------
@@ -105,8 +109,8 @@ def slope(x: FloatArray, y: FloatArray) -> tuple[float, float]:
 
 
 def _jumps(
-    one: Series, beyond_m: FloatArray, step_s: FloatArray, settings: GnssSettings
-) -> tuple[tuple[Jump, ...], int]:
+    one: ReceiverRows, beyond_m: FloatArray, step_s: FloatArray, settings: GnssSettings
+) -> tuple[tuple[PositionJump, ...], int]:
     """Return the largest steps far beyond the usual difference, and how many there are."""
     size = _beyond_jitter(one, beyond_m, settings)
     finite = np.isfinite(size)
@@ -124,8 +128,11 @@ def _jumps(
     return tuple(_jump(one, row, beyond_m[row], step_s[row - 1]) for row in largest.tolist()), len(rows)
 
 
-def _beyond_jitter(one: Series, beyond_m: FloatArray, settings: GnssSettings) -> FloatArray:
-    """Return the size of each step, less what a small error of its time stamp gives along the motion."""
+def _beyond_jitter(one: ReceiverRows, beyond_m: FloatArray, settings: GnssSettings) -> FloatArray:
+    """Return the size of each step without the part that a small error in time explains.
+
+    That is along the motion.
+    """
     size = np.hypot(beyond_m[:, 0], beyond_m[:, 1])
     speed = np.hypot(one.velocity_mps[:, 0], one.velocity_mps[:, 1])
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -135,7 +142,7 @@ def _beyond_jitter(one: Series, beyond_m: FloatArray, settings: GnssSettings) ->
     return np.where(np.isfinite(less), less, size)
 
 
-def _jump(one: Series, row: int, beyond_m: FloatArray, step_s: float) -> Jump:
+def _jump(one: ReceiverRows, row: int, beyond_m: FloatArray, step_s: float) -> PositionJump:
     size_m, velocity = float(np.hypot(*beyond_m)), one.velocity_mps[row - 1, :2]
     speed = float(np.hypot(*velocity))
     along_m = shift_s = None
@@ -146,7 +153,7 @@ def _jump(one: Series, row: int, beyond_m: FloatArray, step_s: float) -> Jump:
             shift_s = along_m / speed
     climbed = one.up_m[row] - one.up_m[row - 1]
     vertical = 0.5 * (one.velocity_mps[row, 2] + one.velocity_mps[row - 1, 2]) * step_s
-    return Jump(
+    return PositionJump(
         float(one.time_s[row]),
         size_m,
         along_m,

@@ -6,9 +6,9 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.base.geodesy import curvature_radii_m
-from groundstation.systems.gnss.answer import Pair
+from groundstation.systems.gnss.answer import ReceiverPair
 from groundstation.systems.gnss.motion import LEAST_STEPS
-from groundstation.systems.gnss.series import Series
+from groundstation.systems.gnss.series import ReceiverRows
 from groundstation.systems.gnss.settings import GnssSettings
 from groundstation.systems.gnss.spells import known
 
@@ -16,19 +16,23 @@ LEAST_SPEEDS_MPS = 3.0  # spread of the speed that shows a delay
 NEIGHBOURS = 4.0  # samples that are one independent value
 
 
-class Compared(NamedTuple):
-    """A pair, and second minus first at the times of the first: north, east, up; velocities north, east."""
+class ComparedReceivers(NamedTuple):
+    """Pair with second minus first at the times of the first.
 
-    answer: Pair
+    Places north, east, up; velocities north, east.
+    """
+
+    answer: ReceiverPair
     time_s: FloatArray
     place_m: FloatArray
     velocity_mps: FloatArray
 
 
-def compare(first: Series, second: Series, settings: GnssSettings) -> Compared | None:
-    """Compare two receivers while both have a fix; None where they are not together for long enough.
+def compare(first: ReceiverRows, second: ReceiverRows, settings: GnssSettings) -> ComparedReceivers | None:
+    """Compare two receivers while both have a fix.
 
-    The second is interpolated to the times of the first between neighbours without a gap.
+    None where they are not together for long enough. The second is interpolated to the times of the first between
+    neighbours without a gap.
     """
     usable = first.has_fix & np.isfinite(first.latitude_deg) & np.isfinite(first.longitude_deg)
     rows = np.flatnonzero(usable & _covered(second, first.time_s))
@@ -53,7 +57,7 @@ def compare(first: Series, second: Series, settings: GnssSettings) -> Compared |
     sigmas = [one.values("horizontal_sigma_m") for one in (first, second)]
     claimed = [float(np.nanmedian(one)) if np.isfinite(one).any() else np.nan for one in sigmas]
     has_velocity = np.isfinite(velocity).all(axis=1)
-    answer = Pair(
+    answer = ReceiverPair(
         first.topic,
         second.topic,
         seconds,
@@ -68,11 +72,14 @@ def compare(first: Series, second: Series, settings: GnssSettings) -> Compared |
         lag_s,
         sigma_s,
     )
-    return Compared(answer, time_s, place, velocity)
+    return ComparedReceivers(answer, time_s, place, velocity)
 
 
-def _covered(one: Series, time_s: FloatArray) -> np.ndarray:
-    """Tell which moments lie between two neighbouring rows of a receiver, both with a fix and a place."""
+def _covered(one: ReceiverRows, time_s: FloatArray) -> np.ndarray:
+    """Tell which moments lie between two neighbouring rows of a receiver.
+
+    Both rows have a fix and a place.
+    """
     if len(one.time_s) < 2:
         return np.zeros(len(time_s), dtype=bool)
     sound = one.has_fix & np.isfinite(one.latitude_deg) & np.isfinite(one.longitude_deg)
@@ -82,7 +89,7 @@ def _covered(one: Series, time_s: FloatArray) -> np.ndarray:
     return np.asarray(inside & joined[at])
 
 
-def _at(one: Series, values: FloatArray, time_s: FloatArray) -> FloatArray:
+def _at(one: ReceiverRows, values: FloatArray, time_s: FloatArray) -> FloatArray:
     """Interpolate values of a receiver linearly; NaN beside rows without one."""
     return np.asarray(np.interp(time_s, one.time_s, values))
 
@@ -90,9 +97,9 @@ def _at(one: Series, values: FloatArray, time_s: FloatArray) -> FloatArray:
 def _along(
     velocity_mps: FloatArray, apart_m: FloatArray, settings: GnssSettings
 ) -> tuple[float | None, float | None, float | None, float | None]:
-    """Return where the second antenna is (forward, right), and the delay of the second receiver with its sigma.
+    """Return place of the second antenna (forward, right) and delay of the second receiver.
 
-    The part of the distance along the motion is that of the antennas, less speed times delay.
+    The delay has its sigma. The part of the distance along the motion is that of the antennas, less speed times delay.
     """
     speed = np.hypot(velocity_mps[:, 0], velocity_mps[:, 1])
     moving = np.isfinite(speed) & (speed > settings.moving_mps)

@@ -1,4 +1,4 @@
-"""Plots of the GNSS reception: states, quality, scatter at standstill, position against velocity, two receivers."""
+"""Plots of the GNSS reception: states, quality, scatter, steps, two receivers."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -79,7 +79,7 @@ def _of(results: FlightResults, topic: str) -> str:
 
 
 def quality(results: FlightResults, topic: str) -> Plot | None:
-    """Return satellites, C/N0, dilution, claimed sigmas and age of corrections of one receiver."""
+    """Return satellites, C/N0, dilution, claimed sigmas, age of corrections of a receiver."""
     data = results.rows_of(GnssQuality)
     if data is None:
         return None

@@ -1,4 +1,4 @@
-"""Rows of one receiver as arrays: local places, velocities, states, and the time each row stands for."""
+"""Rows of one receiver as arrays: places, velocities, states, time each row stands for."""
 
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ FIX_WITHOUT_INTEGRITY = ("none", "2d", "dead_reckoning", "other")  # of which a 
 
 
 @dataclass(frozen=True)
-class Series:
+class ReceiverRows:
     """Rows of a receiver, one for each time.
 
     Parameters
@@ -94,15 +94,21 @@ class Series:
 
     @property
     def missed(self) -> int | None:
-        """Epochs that are missing between the first and the last row; None where the rate is not regular."""
+        """Epochs that are missing between the first and the last row.
+
+        None where the rate is not regular.
+        """
         steps = np.diff(self.time_s)
         if not len(steps) or np.mean(np.abs(steps - self.step_s) <= REGULAR_STEP * self.step_s) < REGULAR_SHARE:
             return None
         return int(np.maximum(np.round(steps / self.step_s) - 1.0, 0.0).sum())
 
 
-def series_of(flight: Flight, topic: str, settings: GnssSettings) -> Series:
-    """Return the rows of a receiver; repeated times are one row, with the first value of each field."""
+def series_of(flight: Flight, topic: str, settings: GnssSettings) -> ReceiverRows:
+    """Return the rows of a receiver.
+
+    Repeated times are one row, with the first value of each field.
+    """
     table = flight[topic].unique_times()
     time_s = flight.seconds(table.time_ns)
     steps = np.diff(time_s)
@@ -118,7 +124,7 @@ def series_of(flight: Flight, topic: str, settings: GnssSettings) -> Series:
     speed = np.where(np.isfinite(speed), speed, table.values("ground_speed_mps"))
     latitude, longitude = on_earth(table.values("latitude_deg"), table.values("longitude_deg"))
     name = "altitude_ellipsoid_m" if table.has("altitude_ellipsoid_m") else "altitude_msl_m"
-    return Series(
+    return ReceiverRows(
         topic,
         table,
         len(flight[topic]),

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray
-from groundstation.systems.gnss.answer import STATE_NAMES, WITHOUT_FIX, WITHOUT_RECORD, Loss, State
-from groundstation.systems.gnss.series import Series
+from groundstation.systems.gnss.answer import STATE_NAMES, WITHOUT_FIX, WITHOUT_RECORD, FixLoss, FixState
+from groundstation.systems.gnss.series import ReceiverRows
 from groundstation.systems.gnss.settings import GnssSettings
 
 NO_RECORD, LOG_SILENT = "no_record", "log_silent"
@@ -23,11 +23,11 @@ class Spells:
 
     @property
     def seconds(self) -> FloatArray:
-        """Their lengths."""
+        """Lengths of the spells."""
         return self.end_s - self.start_s
 
 
-def spells_of(one: Series, others_s: FloatArray | None) -> Spells:
+def spells_of(one: ReceiverRows, others_s: FloatArray | None) -> Spells:
     """Return the spells of a receiver, gaps among them.
 
     ``others_s`` are the times of all rows of other sensors, sorted; a gap in which none of them has a row is one of the
@@ -47,7 +47,7 @@ def spells_of(one: Series, others_s: FloatArray | None) -> Spells:
     return Spells(start[first], end, state[first])
 
 
-def states_of(spells: Spells) -> tuple[State, ...]:
+def states_of(spells: Spells) -> tuple[FixState, ...]:
     """Return the time in each state, the best state first."""
     whole_s = float(spells.seconds.sum())
     found = []
@@ -56,12 +56,15 @@ def states_of(spells: Spells) -> tuple[State, ...]:
         if mine.size:
             seconds = float(mine.sum())
             share = seconds / whole_s if whole_s > 0.0 else float(np.mean(spells.state == name))
-            found.append(State(name, seconds, share, int(mine.size), float(mine.max())))
+            found.append(FixState(name, seconds, share, int(mine.size), float(mine.max())))
     return tuple(found)
 
 
-def losses_of(one: Series, spells: Spells, settings: GnssSettings) -> tuple[Loss, ...]:
-    """Return stretches after the first fix without one, and gaps; single epochs without a fix are none."""
+def losses_of(one: ReceiverRows, spells: Spells, settings: GnssSettings) -> tuple[FixLoss, ...]:
+    """Return stretches after the first fix without one, and gaps.
+
+    Single epochs without a fix are none.
+    """
     with_fix = np.flatnonzero(one.has_fix)
     if not with_fix.size:
         return ()
@@ -79,7 +82,7 @@ def losses_of(one: Series, spells: Spells, settings: GnssSettings) -> tuple[Loss
     return tuple(sorted(losses, key=lambda loss: loss.start_s))
 
 
-def seconds_after_first_fix(one: Series, spells: Spells, kinds: tuple[str, ...]) -> float:
+def seconds_after_first_fix(one: ReceiverRows, spells: Spells, kinds: tuple[str, ...]) -> float:
     """Return the time in some states after the first fix."""
     with_fix = np.flatnonzero(one.has_fix)
     if not with_fix.size:
@@ -88,21 +91,21 @@ def seconds_after_first_fix(one: Series, spells: Spells, kinds: tuple[str, ...])
     return float(spells.seconds[mine].sum())
 
 
-def _around(one: Series, with_fix: NDArray[np.intp], start_s: float, end_s: float) -> tuple[int, int | None]:
+def _around(one: ReceiverRows, with_fix: NDArray[np.intp], start_s: float, end_s: float) -> tuple[int, int | None]:
     """Return the last row with a fix before a loss, and the first one after it."""
     at = int(np.searchsorted(one.time_s[with_fix], start_s))
     later = int(np.searchsorted(one.time_s[with_fix], end_s - 1e-6))
     return int(with_fix[at - 1]), int(with_fix[later]) if later < len(with_fix) else None
 
 
-def _loss(one: Series, state: str, start_s: float, end_s: float, before: int, after: int | None) -> Loss:
+def _loss(one: ReceiverRows, state: str, start_s: float, end_s: float, before: int, after: int | None) -> FixLoss:
     speeds = [known(one.speed_mps[row]) if row is not None else None for row in (before, after)]
     moved_m = None
     if after is not None:
         rows = np.array([after])
         plan = one.plan_m(rows, one.latitude_deg[[before]], one.longitude_deg[[before]])[0]
         moved_m = known(float(np.hypot(*plan)))
-    return Loss(state, start_s, end_s, end_s - start_s, speeds[0], speeds[1], moved_m)
+    return FixLoss(state, start_s, end_s, end_s - start_s, speeds[0], speeds[1], moved_m)
 
 
 def known(value: float) -> float | None:

@@ -1,4 +1,4 @@
-"""Scatter of a receiver at standstill: against the claimed sigmas, and how long errors last."""
+"""Scatter of a receiver at standstill against the claimed sigmas, duration of errors."""
 
 from typing import NamedTuple
 
@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray
-from groundstation.systems.gnss.answer import COARSE, Standstill
-from groundstation.systems.gnss.series import Series
+from groundstation.systems.gnss.answer import COARSE, StandstillScatter
+from groundstation.systems.gnss.series import ReceiverRows
 from groundstation.systems.gnss.settings import GnssSettings
 from groundstation.systems.gnss.spells import known
 from groundstation.tables.motion import runs
@@ -22,16 +22,16 @@ HELD_SHARE = 0.9  # share of rows at the place of the row before: the receiver r
 
 
 class Stood(NamedTuple):
-    """A standstill, its rows, their places about the mean, and the scatter of longer means."""
+    """Standstill with its rows, their places about the mean, and the scatter of means."""
 
-    answer: Standstill
+    answer: StandstillScatter
     rows: NDArray[np.intp]
     offset_m: FloatArray
     averaged_s: FloatArray
     scatter_m: FloatArray
 
 
-def standstill_of(one: Series, phases: Phases, settings: GnssSettings) -> Stood | None:
+def standstill_of(one: ReceiverRows, phases: Phases, settings: GnssSettings) -> Stood | None:
     """Return the longest standstill with one kind of fix; None without one long enough."""
     if len(one.time_s) < settings.standstill_samples_min:
         return None
@@ -57,7 +57,7 @@ def standstill_of(one: Series, phases: Phases, settings: GnssSettings) -> Stood 
     return None if best is None else _judged(one, best[1])
 
 
-def _is_still(one: Series, settings: GnssSettings) -> BoolArray:
+def _is_still(one: ReceiverRows, settings: GnssSettings) -> BoolArray:
     """Tell where the mean velocity about a row is that of something that stands.
 
     Without velocities, where the mean places before and behind it are the same.
@@ -84,7 +84,10 @@ def _is_still(one: Series, settings: GnssSettings) -> BoolArray:
 
 
 def _window_mean(time_s: FloatArray, values: FloatArray, from_s: float, to_s: float) -> FloatArray:
-    """Mean of the finite values between two moments about each row, shape as the values; NaN without any."""
+    """Mean of the finite values between two moments about each row, NaN without any.
+
+    Its shape is that of the values.
+    """
     is_known = np.isfinite(values)
     first = np.searchsorted(time_s, time_s + from_s - 1e-9, side="left")
     behind = np.searchsorted(time_s, time_s + to_s + 1e-9, side="right")
@@ -95,15 +98,15 @@ def _window_mean(time_s: FloatArray, values: FloatArray, from_s: float, to_s: fl
     return np.where(number > 0, middle + (total[behind] - total[first]) / np.maximum(number, 1), np.nan)
 
 
-def _creeps(one: Series, rows: NDArray[np.intp], settings: GnssSettings) -> bool:
-    """Tell whether the mean velocity of a whole standstill is that of something that moves slowly."""
+def _creeps(one: ReceiverRows, rows: NDArray[np.intp], settings: GnssSettings) -> bool:
+    """Tell whether the mean velocity of a whole standstill is that of a slow motion."""
     velocity = one.velocity_mps[rows, :2]
     if not np.isfinite(velocity).any():
         return False
     return float(np.hypot(*np.nanmean(velocity, axis=0))) > CREEP * settings.still_mps
 
 
-def _judged(one: Series, rows: NDArray[np.intp]) -> Stood:
+def _judged(one: ReceiverRows, rows: NDArray[np.intp]) -> Stood:
     middle = np.mean(one.latitude_deg[rows]), np.mean(one.longitude_deg[rows])
     plan = one.plan_m(rows, np.full(len(rows), middle[0]), np.full(len(rows), middle[1]))
     up = one.up_m[rows] - np.nanmean(one.up_m[rows]) if np.isfinite(one.up_m[rows]).any() else one.up_m[rows]
@@ -119,7 +122,7 @@ def _judged(one: Series, rows: NDArray[np.intp]) -> Stood:
         independent = max(min(length_s / max(2.0 * correlation_s, step_s), float(len(rows))), 1.0)
     averaged_s, scatter = scatter_of_means(offset[:, :2], step_s)
     speed = one.speed_mps[rows]
-    answer = Standstill(
+    answer = StandstillScatter(
         start_s=float(one.time_s[rows[0]]),
         end_s=float(one.time_s[rows[-1]]),
         state=str(one.state[rows[0]]),

@@ -1,25 +1,25 @@
-"""What a person would say of a receiver: the sentence, lengths, shares, times."""
+"""Words for a receiver's reception: the sentence, lengths, shares, times."""
 
 from collections.abc import Iterable
 
-from groundstation.systems.gnss.answer import STATE_NAMES, WITHOUT_FIX, WITHOUT_RECORD, Receiver, Standstill
-from groundstation.tables.sources import NEVER_A_FIX
+from groundstation.systems.gnss.answer import STATE_NAMES, WITHOUT_FIX, WITHOUT_RECORD, GnssReceiver, StandstillScatter
 
 FIXED = frozenset(STATE_NAMES) - {*WITHOUT_FIX, *WITHOUT_RECORD}
+NEVER_A_FIX = "GNSS never had a fix"
 WHOLE = 0.9995  # share that is all
 STEP_TOLD = 0.5  # of the scatter: a coarser step of the logged places is told
 FEW = 4  # states that the sentence names
 CENTIMETRES_BELOW_M = 0.995
 
 
-def never_had(one: Receiver) -> str:
+def never_had(one: GnssReceiver) -> str:
     """Return the sentence of a receiver that never had a fix."""
     most = one.satellites_tracked if one.satellites_used is None else one.satellites_used
     satellites = "" if most is None else f", {'at most ' if most else ''}{most:.0f} satellite{'s' * (most != 1)}"
     return f"{NEVER_A_FIX}: {one.rows} row{'s' * (one.rows != 1)}{satellites}"
 
 
-def sentence_of(one: Receiver) -> str:
+def sentence_of(one: GnssReceiver) -> str:
     """Return one sentence on a receiver."""
     if one.first_fix_s is None:
         return never_had(one)
@@ -31,7 +31,7 @@ def sentence_of(one: Receiver) -> str:
     return "; ".join(told)
 
 
-def _states(one: Receiver) -> str:
+def _states(one: GnssReceiver) -> str:
     fixes = [(state.state, one.share_after_first_fix(state.state)) for state in one.states]
     fixes = sorted((pair for pair in fixes if pair[0] in FIXED), key=lambda pair: -pair[1])
     if len(fixes) == 1 and (fixes[0][1] >= WHOLE or one.start_s == one.end_s):
@@ -40,12 +40,12 @@ def _states(one: Receiver) -> str:
     return ", ".join(f"{name_of(state)} {share_text(share)}" for state, share in fixes[:FEW])
 
 
-def _first_fix(one: Receiver) -> str:
+def _first_fix(one: GnssReceiver) -> str:
     waited_s = (one.first_fix_s or 0.0) - one.start_s
     return f"first fix after {seconds_text(waited_s)}, then " if waited_s >= 1.0 else ""
 
 
-def _lost(one: Receiver) -> str:
+def _lost(one: GnssReceiver) -> str:
     if one.start_s == one.end_s:
         return ""
     lost = [loss.seconds for loss in one.losses if loss.state in WITHOUT_FIX]
@@ -63,8 +63,11 @@ def _times(what: str, seconds: list[float]) -> str:
     return f"{what} for {longest}" if len(seconds) == 1 else f"{what} {len(seconds)} times, at most {longest}"
 
 
-def scatter_of(stood: Standstill) -> str:
-    """Return scatter at standstill beside what is claimed; empty where the receiver holds its place."""
+def scatter_of(stood: StandstillScatter) -> str:
+    """Return scatter at standstill beside what is claimed.
+
+    Empty where the receiver holds its place.
+    """
     if stood.is_held:
         return ""
     claimed = "" if stood.claimed_m is None else f" where {length_text(stood.claimed_m)} is claimed"
@@ -73,7 +76,7 @@ def scatter_of(stood: Standstill) -> str:
     return f"scatter {length_text(stood.scatter_m)}{claimed}"
 
 
-def memory_of(stood: Standstill) -> str:
+def memory_of(stood: StandstillScatter) -> str:
     """Return how long errors last, and what that says of the scatter."""
     length_s = stood.end_s - stood.start_s
     if stood.is_held:
