@@ -22,7 +22,7 @@ class Field:
     name : str
         ``quantity_..._unit``; no suffix means no unit.
     unit : str
-        As in the name: deg, m, mps, dps, mps2, nt, a, dots, mhz, or empty.
+        As in the name: deg, m, mps, dps, mps2, nt, a, dots, mhz, dbhz, s, or empty.
     kind : {'double', 'bool', 'text'}
     low, high : float
         Physical range; values outside are findings, not corrected.
@@ -104,6 +104,9 @@ TOPICS: Mapping[str, tuple[Field, ...]] = MappingProxyType(
             _flag("integrity_ok"),
             *_POSITION_SIGMA,
             _text("fix"),
+            _double("satellites_tracked", "", 0.0, 200.0),
+            _double("cn0_dbhz", "dbhz", 0.0, 100.0),
+            _double("age_of_corrections_s", "s", 0.0, 1e6),
         ),
         "onboard": (
             _double("heading_error_deg", "deg", -180.0, 180.0),

@@ -42,6 +42,7 @@ UNITS: Mapping[str, UnitName] = MappingProxyType(
         "mps": UnitName("m/s", decimals=4),
         "dps": UnitName("°/s", "deg/s"),
         "mhz": UnitName("MHz"),
+        "dbhz": UnitName("dB-Hz", decimals=1),
         "hz": UnitName("Hz", decimals=4),
         "dots": UnitName("dots"),
         "ppm": UnitName("ppm"),

@@ -57,6 +57,9 @@ CONVERSIONS: Mapping[str, tuple[str, float]] = MappingProxyType(
         "dots": ("dots", 1.0),
         "fsd": ("dots", DOTS_PER_FULL_SCALE),
         "mhz": ("mhz", 1.0),
+        "dbhz": ("dbhz", 1.0),
+        "s": ("s", 1.0),
+        "ms": ("s", 1e-3),
         "": ("", 1.0),
     }
 )

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Protocol, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.base.atmosphere import pressure_altitude_m
@@ -126,6 +127,21 @@ def scaled(fields: Mapping[str, tuple[str, float]]) -> Callable[[NumericColumns]
 def holds(numbers: NumericColumns, name: str) -> BoolArray | None:
     """Return where a flag is set, shape (n,); None in messages that lack the flag."""
     return numbers[name] != 0.0 if name in numbers else None
+
+
+def named(numbers: FloatArray, names: NDArray[np.str_]) -> Column:
+    """Return the name that each number stands for; the last one for numbers beyond.
+
+    Examples
+    --------
+    >>> kinds = np.array(["none", "fix", "other"])
+    >>> named(np.array([0.0, 1.0, 7.0, -1.0, np.nan]), kinds).values.tolist()
+    ['none', 'fix', 'other', 'other', 'other']
+    """
+    known = np.isfinite(numbers)
+    last = len(names) - 1
+    at = np.where(known & (numbers >= 0.0) & (numbers < last), numbers, last).astype(np.int64)
+    return Column(names[at], known)
 
 
 def pressure_altitude(pressure_pa: FloatArray) -> Columns:

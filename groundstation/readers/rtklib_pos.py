@@ -43,6 +43,7 @@ _TOUCHING = re.compile(rb"(?<=[0-9.])(?=[-+][0-9.])")
 _OF_NO_ROW = re.compile(rb"(?m)^\t?%[^\n]*|^\t|\t?\r?$")  # parts to drop of lines whose cells are separated by tabs
 _PLUS, _MINUS, _POINT, _DIGITS_FROM, _DIGITS_TO = b"+-.09"
 _FIXES = np.array(["none", "rtk_fixed", "rtk_float", "dgnss", "dgnss", "3d", "ppp", "dead_reckoning"])
+_CORRECTED = (1, 2, 3, 4)  # fixed, float, SBAS, DGPS: solutions by corrections, which have an age
 _JST_NS = 9 * 3_600 * NS_PER_S
 _PIECE_BYTES, _LONGEST_LINE = 1 << 20, 1 << 16
 _CALENDAR = TimeRule("local", (0, 1), ("date", "time"), date_formats=("%Y/%m/%d",))
@@ -202,6 +203,9 @@ def _gnss(batch: RecordBatch, form: Form, losses: Losses) -> RecordBatch | None:
         quality = columns["Q"]
         known = quality.mask & (quality.values >= 0) & (quality.values < len(_FIXES))
         found["fix"] = Column(_FIXES[np.where(known, quality.values, 0).astype(np.int64)], known)
+        if "age" in columns:
+            age, corrected = columns["age"], known & np.isin(quality.values, _CORRECTED)
+            found["age_of_corrections_s"] = Column(age.values, age.mask & corrected & (age.values >= 0.0))
     if "ns" in columns:
         found["satellites_used"] = columns["ns"]
     rows = np.logical_or.reduce([column.mask for column in found.values()]) if found else np.zeros(len(batch), bool)

@@ -29,6 +29,7 @@ DEFAULT_DECIMALS = {
     "m2": 3,
     "dots": 4,
     "mhz": 3,
+    "dbhz": 1,
     "": 2,
 }
 

@@ -22,6 +22,7 @@ OURS = (  # in the order they are shown
     "groundstation.systems.reference.system",
     "groundstation.systems.cooperative.system",
     "groundstation.systems.planning.system",
+    "groundstation.systems.gnss.system",
 )
 
 

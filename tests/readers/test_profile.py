@@ -27,6 +27,8 @@ FIELD_OF_UNIT = {
     "a": "electric.current_a",
     "dots": "guidance.lateral_deviation_dots",
     "mhz": "guidance.frequency_mhz",
+    "dbhz": "gnss.cn0_dbhz",
+    "s": "gnss.age_of_corrections_s",
     "": "gnss.hdop",
 }
 FACTORS = {
@@ -62,6 +64,9 @@ FACTORS = {
     "dots": 1.0,
     "fsd": 2.0,
     "mhz": 1.0,
+    "dbhz": 1.0,
+    "s": 1.0,
+    "ms": 1e-3,
     "": 1.0,
 }
 

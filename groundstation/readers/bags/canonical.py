@@ -93,8 +93,19 @@ def navsatfix(values: Values) -> Columns:
         "longitude_deg": Column(values["longitude"], has_fix),
         "altitude_ellipsoid_m": _where(altitude, has_fix & ~np.isnan(altitude)),
         "integrity_ok": Column(has_fix),
+        "fix": _fix(values),
         **sigmas(values, has_fix),
     }
+
+
+def _fix(values: Values) -> Column:
+    """Return the kind of the fix by its status.
+
+    -1 is none, 0 a fix, 1 one corrected by satellites, 2 from the ground. Drivers state RTK as corrected from the
+    ground (2), so ``dgnss`` may be better than it says. -2 is unknown.
+    """
+    status = values["status.status"]
+    return Column(np.select([status < 0.0, status < 1.0], ["none", "3d"], "dgnss"), status >= -1.0)
 
 
 def sigmas(values: Values, present: np.ndarray) -> Columns:
@@ -146,8 +157,12 @@ def gps_fix(values: Values) -> Columns:
     columns["track_deg"] = direction(np.where(has_track, track, 0.0), has_track)
     columns["velocity_north_mps"], columns["velocity_east_mps"] = Column(north, has_track), Column(east, has_track)
     columns["integrity_ok"] = Column(has_fix)
+    columns["fix"] = _fix(values)
     if "status.satellites_used" in values:
         columns["satellites_used"] = Column(values["status.satellites_used"])
+    if "status.satellites_visible" in values:
+        visible = values["status.satellites_visible"]
+        columns["satellites_tracked"] = Column(visible, visible > 0.0)
     return columns | sigmas(values, has_fix)
 
 

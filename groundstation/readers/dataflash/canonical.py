@@ -21,6 +21,7 @@ from groundstation.readers.dataflash.overview import DataflashOverview, Unit
 from groundstation.readers.dataflash.rules import FIX_2D, FIX_3D, FieldRule, UnknownUnits
 from groundstation.readers.dataflash.values import RecordRows, as_double
 from groundstation.readers.layout import velocity_from_track
+from groundstation.readers.mapping import named
 from groundstation.readers.parts import TopicPart, bounded, merged, occupied
 from groundstation.readers.places import nowhere
 
@@ -221,16 +222,24 @@ class Mapper:
             name: Column(values, has_2d) for name, values in self._values(topic, rows, rules.GNSS_QUALITY).items()
         }
         columns |= self._plain(rules.SATELLITES)(topic, rows)
-        return columns | self._speed_sigma(rows, has_3d)
+        if has_status:
+            columns["fix"] = named(as_double(rows.values("Status")), rules.FIXES)
+        return columns | self._sigmas(rows, has_3d)
 
-    def _speed_sigma(self, rows: RecordRows, has_fix: BoolArray) -> dict[str, Column]:
-        """Return the speed accuracy that the receiver logged separately at the same time."""
-        times, sigmas = self._found.speed_sigma.get((rows.definition.name, rows.instance), (None, None))
-        if times is None or sigmas is None or not len(times):
+    def _sigmas(self, rows: RecordRows, has_fix: BoolArray) -> dict[str, Column]:
+        """Return what the receiver says of its own errors, logged separately at the same time.
+
+        A position error of 0 is one that the receiver does not know.
+        """
+        times, sigmas = self._found.sigmas.get((rows.definition.name, rows.instance), (None, {}))
+        if times is None or not len(times):
             return {}
         at = np.minimum(np.searchsorted(times, rows.time_ns.values), len(times) - 1)
         known = (times[at] == rows.time_ns.values) & rows.time_ns.mask & has_fix
-        return {"velocity_sigma_mps": Column(sigmas[at], known)}
+        return {
+            name: Column(values[at], known if name == "velocity_sigma_mps" else known & (values[at] > 0.0))
+            for name, values in sigmas.items()
+        }
 
     def _magnetometer(self, topic: str, rows: RecordRows) -> dict[str, Column]:
         healthy = frozen(rows.values("Health") != 0) if rows.definition.has_numbers("Health") else None

@@ -42,7 +42,7 @@ WANTED: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "IMU": _sources(rules.RATES, rules.ACCELERATIONS),
         "GYR": _sources(rules.RATES),
         "ACC": _sources(rules.ACCELERATIONS),
-        **dict.fromkeys(("GPA", "GPA2"), ("VDop", "HAcc", "VAcc", rules.SPEED_SIGMA.source)),
+        **dict.fromkeys(("GPA", "GPA2"), ("VDop", *_sources(rules.SIGMAS))),
         "PARM": ("Name", "Value"),
         "MSG": ("Message",),
         "EV": ("Id",),

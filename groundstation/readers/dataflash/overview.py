@@ -14,7 +14,7 @@ from groundstation.base.geodesy import has_position
 from groundstation.base.records import BoolArray, Damage, Int64Array
 from groundstation.readers.dataflash.blocks import RecordBlock, Scanner
 from groundstation.readers.dataflash.definitions import RecordDefinition, Units
-from groundstation.readers.dataflash.rules import FIX_3D, SPEED_SIGMA, UnknownUnits
+from groundstation.readers.dataflash.rules import FIX_3D, SIGMAS, FieldRule, UnknownUnits
 from groundstation.readers.dataflash.values import RecordRows, as_double, by_instance, rows_of
 
 MESSAGES_KEPT = 100
@@ -78,7 +78,8 @@ class DataflashOverview:
     gps_times : GpsTimes
     has_fix : bool
         Whether any receiver had a position.
-    speed_sigma : mapping of receiver to (times in ns, m/s)
+    sigmas : mapping of receiver to (times in ns, values by field)
+        What the receiver says of its own errors, logged in a record of its own.
     primary_core : mapping of EKF status type to States
         Which of the filter's cores was in use.
     landed : States
@@ -94,7 +95,7 @@ class DataflashOverview:
     messages: tuple[str, ...]
     gps_times: GpsTimes
     has_fix: bool
-    speed_sigma: Mapping[Unit, tuple[Int64Array, FloatArray]]
+    sigmas: Mapping[Unit, tuple[Int64Array, Mapping[str, FloatArray]]]
     primary_core: Mapping[str, States]
     landed: States
     damages: tuple[Damage, ...]
@@ -123,7 +124,7 @@ class _Survey:
         self._messages: list[str] = []
         self._gps: list[tuple[Any, ...]] = []
         self._has_fix = False
-        self._sigma: dict[Unit, list[tuple[Any, Any]]] = {}
+        self._sigma: dict[Unit, list[tuple[Int64Array, dict[str, FloatArray]]]] = {}
         self._unknown = UnknownUnits()
         self._cores: dict[str, list[tuple[Any, Any]]] = {}
         self._landed: list[tuple[Any, Any]] = []
@@ -178,7 +179,7 @@ class _Survey:
             messages=tuple(self._messages),
             gps_times=GpsTimes(*(_joined([part[n] for part in self._gps]) for n in range(4))),
             has_fix=self._has_fix,
-            speed_sigma={unit: _sorted_pairs(parts) for unit, parts in self._sigma.items()},
+            sigmas={unit: _sorted_pairs(parts) for unit, parts in self._sigma.items()},
             primary_core={name: _states(parts) for name, parts in self._cores.items()},
             landed=_states(self._landed),
             damages=(*scanner.spans.damages(), *self._more_damages(scanner), *self._unknown.damages()),
@@ -244,17 +245,20 @@ class _Survey:
             self._gps.append((week, week_ms, rows.time_ns.values[timed], rows.record_index[timed]))
 
     def _accuracy(self, rows: RecordRows) -> None:
-        if not rows.definition.has_numbers("SAcc"):
-            return
         instance_field = self._units.instance_field(rows.definition)
-        factor = SPEED_SIGMA.scale(rows.definition, self._units)
-        if factor is None:
-            self._unknown.add(SPEED_SIGMA, rows.definition, self._units, len(rows), "gnss")
+        factors: dict[FieldRule, float] = {}
+        for rule in SIGMAS:
+            factor = rule.scale(rows.definition, self._units) if rows.definition.has_numbers(rule.source) else None
+            if factor is not None:
+                factors[rule] = factor
+            elif rows.definition.has_numbers(rule.source):
+                self._unknown.add(rule, rows.definition, self._units, len(rows), "gnss")
+        if not factors:
             return
         for part in by_instance(rows, instance_field) if instance_field else (rows,):
             receiver = (_ACCURACY_TYPES[rows.definition.name], part.instance)
-            sigma = as_double(part.values("SAcc")) * factor
-            self._sigma.setdefault(receiver, []).append((part.time_ns.values, sigma))
+            sigmas = {rule.field: as_double(part.values(rule.source)) * factor for rule, factor in factors.items()}
+            self._sigma.setdefault(receiver, []).append((part.time_ns.values, sigmas))
 
     def _core(self, rows: RecordRows) -> None:
         if rows.definition.has_integers("PI"):
@@ -288,7 +292,14 @@ def _fixed(rows: RecordRows) -> BoolArray:
     return np.zeros(len(rows), dtype=bool)
 
 
-def _sorted_pairs(parts: list[tuple[Any, Any]]) -> tuple[Int64Array, FloatArray]:
+def _sorted_pairs(
+    parts: list[tuple[Int64Array, dict[str, FloatArray]]],
+) -> tuple[Int64Array, Mapping[str, FloatArray]]:
     times = np.concatenate([time for time, _values in parts])
     order = np.argsort(times, kind="stable")
-    return times[order], np.concatenate([values for _time, values in parts])[order]
+    names = dict.fromkeys(name for _time, values in parts for name in values)
+    columns = {
+        name: np.concatenate([values.get(name, np.full(len(time), np.nan)) for time, values in parts])[order]
+        for name in names
+    }
+    return times[order], columns

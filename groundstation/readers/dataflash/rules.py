@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from math import isclose
 from types import MappingProxyType
 
+import numpy as np
+
 from groundstation.base.records import Damage
 from groundstation.base.units import CONVERSIONS
 from groundstation.readers.dataflash.definitions import RecordDefinition, Units
@@ -137,7 +139,11 @@ GNSS_VELOCITY = (
     FieldRule("GCrs", "track_deg", "deg", integer_multiplier=0.01),
     FieldRule("VZ", "velocity_down_mps", "m/s", integer_multiplier=0.01),
 )
-SPEED_SIGMA = FieldRule("SAcc", "velocity_sigma_mps", "m/s", integer_multiplier=0.01)
+SIGMAS = (
+    FieldRule("SAcc", "velocity_sigma_mps", "m/s", integer_multiplier=0.01),
+    FieldRule("HAcc", "horizontal_sigma_m", "m", integer_multiplier=0.01),
+    FieldRule("VAcc", "vertical_sigma_m", "m", integer_multiplier=0.01),
+)
 GNSS_QUALITY = (FieldRule("HDop", "hdop", integer_multiplier=0.01),)
 SATELLITES = (FieldRule("NSats", "satellites_used"),)
 FIELD = tuple(
@@ -150,6 +156,8 @@ WIND = (FieldRule("VWN", "wind_north_mps", "m/s"), FieldRule("VWE", "wind_east_m
 HEIGHT = (FieldRule("Dist", "height_m", "m", integer_multiplier=0.01),)
 
 FIX_2D, FIX_3D = 2, 3  # states of a receiver
+# 0 and 1 no receiver and no fix, 4 with SBAS or DGPS. Source: ArduPilot, libraries/AP_GPS/AP_GPS.h, GPS_Status.
+FIXES = np.array(["none", "none", "2d", "3d", "dgnss", "rtk_float", "rtk_fixed", "other"])
 MOST_SENSORS = 16  # sensors of one type; a higher instance is damage
 # Sensors of one kind in the order in which their topics are numbered; the first group that has records is taken.
 SENSOR_TYPES: Mapping[str, tuple[tuple[str, ...], ...]] = MappingProxyType(

@@ -45,8 +45,9 @@ def gnss_batch(epochs: SentenceEpochs, time: Column, tally: StreamTally) -> Reco
         columns |= _merged(columns, _position(epochs, formatter))
     _add_heights(epochs, columns, tally)
     columns |= _velocity(epochs)
-    columns |= credible_dilution(_quality(epochs))
+    columns |= credible_dilution(_quality(epochs)) | _signals(epochs)
     _add_solution(epochs, columns, tally)
+    columns |= _age(epochs, columns["fix"])
     columns = credible_position(columns, "gnss", epochs.places, tally)
     columns = {name: column for name, column in columns.items() if column.mask.any()}
     if not len(epochs) or not columns:
@@ -195,6 +196,44 @@ def _quality(epochs: SentenceEpochs) -> Columns:
         both = spread["stdLat"].mask & spread["stdLong"].mask
         columns["horizontal_sigma_m"] = Column(np.hypot(spread["stdLat"].values, spread["stdLong"].values), both)
         columns["vertical_sigma_m"] = spread["stdAlt"]
+    return columns
+
+
+def _signals(epochs: SentenceEpochs) -> Columns:
+    """Return satellites tracked and the mean C/N0 of their signals, of the GSV of an epoch.
+
+    A satellite without a C/N0 is in view and not tracked.
+    """
+    owners, satellites, strengths = [], [], []
+    for number, (sentences, epoch) in enumerate(epochs.of("GSV")):
+        for place in range(1, 5):
+            name, strength = sentences.columns[f"svid_0{place}"], sentences.columns[f"cno_0{place}"]
+            rows = (epoch >= 0) & name.mask & strength.mask & (strength.values > 0.0)
+            owners.append(epoch[rows])
+            satellites.append(number * 1_000.0 + np.clip(name.values[rows], 0.0, 999.0))
+            strengths.append(strength.values[rows])
+    if not owners or not sum(map(len, owners)):
+        return {}
+    owner, strength_dbhz = np.concatenate(owners), np.concatenate(strengths)
+    pairs = np.unique(owner * 1_000_000 + np.concatenate(satellites).astype(np.int64))
+    tracked = np.bincount(pairs // 1_000_000, minlength=len(epochs)).astype(np.float64)
+    number_of = np.bincount(owner, minlength=len(epochs))
+    mean_dbhz = np.bincount(owner, weights=strength_dbhz, minlength=len(epochs)) / np.maximum(number_of, 1)
+    return {"satellites_tracked": Column(tracked, number_of > 0), "cn0_dbhz": Column(mean_dbhz, number_of > 0)}
+
+
+def _age(epochs: SentenceEpochs, fix: Column) -> Columns:
+    """Return the age of the corrections by GGA or GNS.
+
+    Without a fix that uses them it is a filler.
+    """
+    corrected = fix.mask & np.isin(fix.values, ("dgnss", "rtk_float", "rtk_fixed"))
+    columns: Columns = {}
+    for formatter in ("GNS", "GGA"):
+        found = epochs.values(formatter, ("diffAge",))
+        if found:
+            age = found["diffAge"]
+            columns |= _merged(columns, {"age_of_corrections_s": Column(age.values, age.mask & corrected)})
     return columns
 
 

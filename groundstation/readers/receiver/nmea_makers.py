@@ -13,6 +13,7 @@ from groundstation.readers.receiver.nmea import SentenceEpochs
 
 # Status of u-blox's PUBX 00; NF (no fix) and TT (time only) are none.
 _UBX_STATUS = {"DR": "dead_reckoning", "G2": "2d", "G3": "3d", "D2": "2d", "D3": "dgnss", "RK": "gnss_ins"}
+_CORRECTED = ("D2", "D3")
 # Trimble's quality of PTNL GGK and Ashtech's kind of PASHR POS; other numbers are kinds of their own.
 _GGK_QUALITY = {0: "none", 1: "3d", 2: "rtk_float", 3: "rtk_fixed", 4: "dgnss", 5: "dgnss"}
 _ABOVE_ELLIPSOID = re.compile(r"EHT([+-]?\d{1,6}(?:\.\d{1,6})?)")
@@ -36,7 +37,7 @@ def makers_solution(epochs: SentenceEpochs) -> Columns:
 
 def _of_ublox(epochs: SentenceEpochs) -> Columns:
     """Return columns of PUBX 00: heights above the ellipsoid, km/h, down positive."""
-    numbers = ("altRef", "hAcc", "vAcc", "SOG", "COG", "vVel", "HDOP", "numSVs")
+    numbers = ("altRef", "hAcc", "vAcc", "SOG", "COG", "vVel", "HDOP", "numSVs", "diffAge")
     found = epochs.values("PUBX.00", ("lat", "lon", "navStat", *numbers))
     if not found:
         return {}
@@ -63,6 +64,9 @@ def _of_ublox(epochs: SentenceEpochs) -> Columns:
         "satellites_used": Column(found["numSVs"].values, found["numSVs"].mask),
         "integrity_ok": Column(~np.isin(fix, ("none", "dead_reckoning")), status.mask & upright),
         "fix": Column(fix, status.mask),
+        "age_of_corrections_s": Column(
+            found["diffAge"].values, present["diffAge"] & np.isin(status.values, _CORRECTED)
+        ),
     }
 
 
@@ -90,10 +94,12 @@ def _of_ashtech(epochs: SentenceEpochs) -> Columns:
 
     Its height and speed are of several kinds and units by the device, and stay raw.
     """
-    found = epochs.values("PASHR.POS", ("lat", "lon", "solnType", "sip", "PDOP", "HDOP"))
+    found = epochs.values("PASHR.POS", ("lat", "lon", "solnType", "sip", "PDOP", "HDOP", "corrAge"))
     if not found:
         return {}
-    return _place(found, _kinds(found["solnType"], _POS_KIND)) | {
+    age, kind = found["corrAge"], found["solnType"]
+    return _place(found, _kinds(kind, _POS_KIND)) | {
+        "age_of_corrections_s": Column(age.values, age.mask & kind.mask & (kind.values > 0)),
         "pdop": found["PDOP"],
         "hdop": found["HDOP"],
         "satellites_used": found["sip"],

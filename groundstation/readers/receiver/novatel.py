@@ -61,6 +61,7 @@ def _fixes() -> NDArray[np.str_]:
 
 
 _FIXES = _fixes()
+_CORRECTED = ("dgnss", "rtk_float", "rtk_fixed", "ppp")  # fixes by corrections, which have an age
 
 
 class TimedMessages(Messages):
@@ -160,6 +161,7 @@ def gnss_batch(block: MessagesByName, leader: str, tally: StreamTally) -> Record
     height, undulation = fields["orthometric_height"], fields["undulation"].astype(np.float64)
     kind = np.where(computed, np.minimum(fields["position_type"], _LAST_TYPE), 0)
     flat = kind == _HEIGHT_IS_GIVEN
+    age_s = fields["diff_age"].astype(np.float64)
     upright = computed & ~flat
     columns = {
         "latitude_deg": Column(fields["latitude"], computed),
@@ -171,6 +173,8 @@ def gnss_batch(block: MessagesByName, leader: str, tally: StreamTally) -> Record
         "satellites_used": Column(fields["num_soln_svs"].astype(np.float64)),
         "integrity_ok": Column(computed, ~flat),
         "fix": Column(_FIXES[kind]),
+        "satellites_tracked": Column(fields["num_svs"].astype(np.float64)),
+        "age_of_corrections_s": Column(age_s, np.isin(_FIXES[kind], _CORRECTED) & (age_s >= 0.0)),
     }
     columns |= _joined(block, messages, VELOCITY_OF[leader], _velocity)
     columns |= _joined(block, messages, "PSRDOP", _dilution)

@@ -17,6 +17,7 @@ from groundstation.readers.receiver.messages import Columns, MessagesByName, occ
 from groundstation.readers.receiver.tally import MOVING_MPS, StreamTally
 from groundstation.readers.receiver.times import Anchors
 from groundstation.readers.receiver.ubx import time_of
+from groundstation.readers.receiver.ubx_signals import signals
 
 DEAD_RECKONING, FIX_2D, FIX_3D, WITH_SENSORS = 1, 2, 3, 4
 FLOAT, FIXED = 1, 2
@@ -26,6 +27,8 @@ OTHER_SOLUTIONS = ("HNR-PVT", "NAV2-PVT", "NAV2-PVAT", "NAV2-POSLLH")
 POSITION_SOURCES = (*FIRST_SOLUTION, *OTHER_SOLUTIONS)  # the first that a log has leads
 ATTITUDE_SOURCES = ("NAV-PVAT", "NAV-ATT", "NAV-RELPOSNED", "NAV-PVT", "HNR-ATT", "HNR-PVT")
 _FIXES = np.array(["none", "dead_reckoning", "2d", "3d", "gnss_ins", "none", "other"])  # the last but one: time only
+# Upper ends of the classes of NAV-PVT.flags3.lastCorrectionAge: 0 is unknown, the last is 120 s and more.
+_CORRECTION_AGE_S = np.array([0.0, 1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 90.0, 120.0, 120.0])
 _UPRIGHT = {"altitude_ellipsoid_m", "altitude_msl_m", "vertical_sigma_m", "velocity_down_mps"}
 _MOVING = {
     *("latitude_deg", "longitude_deg", "horizontal_sigma_m", "velocity_north_mps", "velocity_east_mps"),
@@ -53,6 +56,7 @@ def gnss_batch(block: MessagesByName, leader: str, anchors: Anchors, tally: Stre
     if family == "NAV":
         columns |= _precise(block, fields, columns)
     columns = _added(block, f"{family}-DOP", fields, _dilution) | columns
+    columns |= signals(block, family, fields)
     columns = credible_position(credible_dilution(columns), "gnss", messages.places, tally)
     return occupied("gnss", messages.places, time_of(messages, anchors), columns)
 
@@ -113,6 +117,10 @@ def _solution(fields: Mapping[str, NDArray[Any]]) -> Columns:
     }
     if "pDOP" in fields:
         columns["pdop"] = Column(fields["pDOP"], has_fix)
+    if "lastCorrectionAge" in fields:
+        age = fields["lastCorrectionAge"]
+        known = has_fix & fields["diffSoln"] & (age > 0)
+        columns["age_of_corrections_s"] = Column(_CORRECTION_AGE_S[np.minimum(age, len(_CORRECTION_AGE_S) - 1)], known)
     return columns
 
 

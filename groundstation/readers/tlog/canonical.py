@@ -14,11 +14,14 @@ from groundstation.base.geodesy import has_position
 from groundstation.base.records import BoolArray, Column
 from groundstation.base.units import DEG_PER_RAD, MPS2_PER_G, NT_PER_GAUSS
 from groundstation.readers.layout import velocity_from_track, wind_from_direction
-from groundstation.readers.mapping import Columns, NumericColumns, Role, SourceRule, direction, pressure_altitude
+from groundstation.readers.mapping import Columns, NumericColumns, Role, SourceRule, direction, named, pressure_altitude
 
 UNKNOWN_16 = 65_535.0
 ARMED, ON_GROUND = 128, 1
-_2D_FIX, _3D_FIX = 2.0, 3.0
+_2D_FIX, _3D_FIX, _CORRECTED = 2.0, 3.0, 4.0
+# GPS_FIX_TYPE: 0 and 1 no fix, 4 DGPS or SBAS, 7 a fixed place of a base station.
+_FIXES = np.array(["none", "none", "2d", "3d", "dgnss", "rtk_float", "rtk_fixed", "other", "ppp", "other"])
+_UNKNOWN_32 = 4_294_967_295.0
 
 
 def attitude(rows: NumericColumns) -> Columns:
@@ -65,11 +68,24 @@ def gnss(rows: NumericColumns) -> Columns:
         "hdop": Column(rows["eph"] * 0.01, rows["eph"] != UNKNOWN_16),
         "satellites_used": Column(rows["satellites_visible"], rows["satellites_visible"] != 255.0),
         "integrity_ok": Column(rows["fix_type"] >= _3D_FIX),
+        "fix": named(rows["fix_type"], _FIXES),
     }
-    for name, source in (("altitude_ellipsoid_m", "alt_ellipsoid"), ("velocity_sigma_mps", "vel_acc")):
+    for name, source in _EXTENSIONS:
         if source in rows:  # an extension: zero where the sender has none
             columns[name] = Column(rows[source] * 1e-3, has_fix & (rows[source] != 0.0))
+    if "dgps_age" in rows:
+        age_ms = rows["dgps_age"]
+        is_told = (rows["fix_type"] >= _CORRECTED) & (age_ms > 0.0) & (age_ms < _UNKNOWN_32)
+        columns["age_of_corrections_s"] = Column(age_ms * 1e-3, is_told)
     return columns
+
+
+_EXTENSIONS = (
+    ("altitude_ellipsoid_m", "alt_ellipsoid"),
+    ("velocity_sigma_mps", "vel_acc"),
+    ("horizontal_sigma_m", "h_acc"),
+    ("vertical_sigma_m", "v_acc"),
+)
 
 
 def imu(rows: NumericColumns) -> Columns:

@@ -21,12 +21,15 @@ from groundstation.readers.mapping import (
     SourceRule,
     direction,
     holds,
+    named,
     pressure_altitude,
     scaled,
 )
 
 _DOWNWARD = 25  # distance_sensor.orientation: ROTATION_DOWNWARD_FACING
 _2D_FIX, FIX_3D, _EXTRAPOLATED = 2, 3, 8
+# sensor_gps.fix_type: 0 and 1 no fix, 4 corrected code, 8 extrapolated; 7 is not used.
+_FIXES = np.array(["none", "none", "2d", "3d", "dgnss", "rtk_float", "rtk_fixed", "other", "dead_reckoning", "other"])
 _INVALID = 0x7FFFFFFF  # sensor_combined.<sensor>_timestamp_relative of a sensor that is not there
 _HPA_BELOW = 1_200.0  # sensor_baro.pressure is in hPa before PX4 1.13, in Pa from then on
 _UNKNOWN_CURRENT = -1.0
@@ -127,6 +130,7 @@ def gnss(rows: NumericColumns) -> Columns:
     if "satellites_used" in rows:
         columns["satellites_used"] = Column(rows["satellites_used"])
     columns["integrity_ok"] = Column((rows["fix_type"] >= FIX_3D) & (rows["fix_type"] != _EXTRAPOLATED))
+    columns["fix"] = named(rows["fix_type"], _FIXES)
     return columns
 
 
@@ -147,8 +151,11 @@ _GNSS_FIELDS: Mapping[str, tuple[tuple[str, float], ...]] = {
     "track_deg": (("cog_rad", DEG_PER_RAD),),
     "hdop": (("hdop", 1.0),),
     "velocity_sigma_mps": (("s_variance_m_s", 1.0),),
+    "horizontal_sigma_m": (("eph", 1.0),),
+    "vertical_sigma_m": (("epv", 1.0),),
 }
-_NEVER_ZERO = ("hdop", "velocity_sigma_mps")  # a driver that does not know them leaves 0
+# A driver that does not know them leaves 0.
+_NEVER_ZERO = ("hdop", "velocity_sigma_mps", "horizontal_sigma_m", "vertical_sigma_m")
 
 
 def _air_data(rows: NumericColumns) -> Columns:

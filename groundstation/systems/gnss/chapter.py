@@ -1,0 +1,267 @@
+"""Chapter on the GNSS reception of a flight."""
+
+from collections.abc import Callable
+from typing import Any
+
+from groundstation.chapters.assessed import without_answer
+from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, Tone, kept
+from groundstation.chapters.wording import clock, number, typeset, with_full_stop
+from groundstation.results.flight import FlightResults
+from groundstation.systems.gnss.answer import (
+    WITHOUT_FIX,
+    WITHOUT_RECORD,
+    FixLoss,
+    GnssReceiver,
+    GnssReception,
+    Grade,
+    PositionJump,
+    ReceiverPair,
+)
+from groundstation.systems.gnss.wording_answer import length_text, memory_of, name_of, seconds_text, share_text
+
+TITLE = "GNSS reception"
+LEAD = "What the receiver had over time, how good it was, and where it was lost."
+MARKS: dict[Grade, Mark] = {
+    "good": Mark("good", "Good"),
+    "warn": Mark("warn", "Warning"),
+    "bad": Mark("bad", "Bad"),
+    "unknown": Mark("unknown", "Not judged"),
+}
+NOT_LOGGED = "not logged"
+MOST_ROWS = 20
+NOT_JUDGED = (
+    "The log has neither the kind of fix nor satellites, dilution or claimed accuracy: only losses and jumps show."
+)
+
+
+def gnss(results: FlightResults) -> Section | None:
+    """Return the chapter; None when the flight was not assessed and no reason is known."""
+    answer = results.answer(GnssReception)
+    if answer is None:
+        return without_answer(results, "gnss", TITLE, LEAD)
+    tone: Tone = "bad" if answer.grade == "bad" else "warn"
+    notes = [Note(with_full_stop(typeset(reason)), tone) for reason in answer.reasons]
+    if answer.grade == "unknown":
+        notes.append(Note(NOT_JUDGED, "unknown"))
+    parts: list[Part | None] = [*notes, Figure("gnss.states"), _states(answer), _quality(answer)]
+    for one in answer.receivers:
+        parts += [Figure("gnss.quality", of=one.topic), *_standstill(one, answer), *_motion(one, answer)]
+    parts += [_losses(answer), _jumps(answer)]
+    for pair in answer.pairs:
+        parts += [_pair(pair), Figure("gnss.pair", of=f"{pair.second} from {pair.first}")]
+    return Section("gnss", TITLE, LEAD, kept(parts), typeset(answer.sentence), claim=_claim(answer))
+
+
+def _claim(answer: GnssReception) -> Claim:
+    main = answer.receiver
+    fixes = [one for one in main.states if one.state not in (*WITHOUT_FIX, *WITHOUT_RECORD)]
+    best = max(fixes, key=lambda one: one.share, default=None)
+    value = "" if best is None else share_text(main.share_after_first_fix(best.state)).replace(" %", "%")
+    remark = "" if best is None else name_of(best.state)
+    told = [
+        ("Satellites", number(main.satellites_used, 0), "median"),
+        ("HDOP", number(main.hdop, 1), "median"),
+        ("C/N0", number(main.cn0_dbhz, 0, "dB-Hz"), "median"),
+    ]
+    stood = main.standstill
+    if stood is not None and not stood.is_held and not stood.is_coarse:
+        claimed = "" if stood.claimed_m is None else f"{length_text(stood.claimed_m)} claimed"
+        told.append(("Scatter", length_text(stood.scatter_m), claimed))
+    figures = tuple(one for one in told if one[1] != "—")
+    sentences = tuple(with_full_stop(typeset(reason)) for reason in answer.reasons)
+    return Claim(Rank.GNSS, MARKS[answer.grade], typeset(answer.sentence), value, remark, sentences, figures)
+
+
+def _states(answer: GnssReception) -> Grid:
+    heads = (
+        *(Head("Receiver"), Head("State"), Head("Time", True), Head("Share", True)),
+        *(Head("Spells", True), Head("Longest", True)),
+    )
+    rows = [
+        (
+            *(one.topic, name_of(state.state), seconds_text(state.seconds), share_text(state.share)),
+            *(number(state.spells, 0), seconds_text(state.longest_s)),
+        )
+        for one in answer.receivers
+        for state in one.states
+    ]
+    return Grid(
+        "States of the fix", heads, rows, "Shares are of time, from the first row to the last.", ("gnss_states",)
+    )
+
+
+def _quality(answer: GnssReception) -> Grid:
+    heads = (Head("Quantity"), *(Head(one.topic, True) for one in answer.receivers))
+    rows = [(title, *(told(one) for one in answer.receivers)) for title, told in QUALITY]
+    caption = "Medians over the time with a fix; in brackets what one twentieth of the time is beyond."
+    return Grid("Quality", heads, rows, caption, ("gnss_quality",))
+
+
+def _with_tail(name: str, tail: str, places: int, unit: str = "") -> Callable[[GnssReceiver], str]:
+    def told(one: GnssReceiver) -> str:
+        value, beyond = getattr(one, name), getattr(one, tail)
+        if value is None:
+            return NOT_LOGGED
+        return number(value, places, unit) + ("" if beyond is None else f" ({number(beyond, places, unit)})")
+
+    return told
+
+
+def _length(value: float | None) -> str:
+    return NOT_LOGGED if value is None else length_text(value)
+
+
+def _behind_ins(one: GnssReceiver) -> str:
+    if one.behind_ins_s is None:
+        return "not observed"
+    return f"{number(one.behind_ins_s, 3, 's', signed=True)} ± {number(one.behind_ins_sigma_s, 3, 's')}"
+
+
+QUALITY: tuple[tuple[str, Callable[[GnssReceiver], str]], ...] = (
+    ("Rows", lambda one: number(one.rows, 0)),
+    ("Repeated times", lambda one: number(one.repeated_rows, 0)),
+    ("Rate", lambda one: number(one.rate_hz, 2, "Hz")),
+    (
+        "Epochs missing",
+        lambda one: "rate not regular" if one.missed_epochs is None else number(one.missed_epochs, 0),
+    ),
+    (
+        "First fix after",
+        lambda one: "never" if one.first_fix_s is None else seconds_text(one.first_fix_s - one.start_s),
+    ),
+    ("Satellites used", _with_tail("satellites_used", "satellites_used_low", 0)),
+    ("Satellites tracked", _with_tail("satellites_tracked", "satellites_tracked", 0)),
+    ("C/N0", _with_tail("cn0_dbhz", "cn0_low_dbhz", 1, "dB-Hz")),
+    ("HDOP", _with_tail("hdop", "hdop_high", 2)),
+    ("PDOP", _with_tail("pdop", "pdop_high", 2)),
+    ("Claimed horizontal σ", lambda one: _length(one.horizontal_sigma_m)),
+    ("Claimed vertical σ", lambda one: _length(one.vertical_sigma_m)),
+    (
+        "Claimed σ of velocity",
+        lambda one: NOT_LOGGED if one.velocity_sigma_mps is None else number(one.velocity_sigma_mps, 3, "m/s"),
+    ),
+    ("Age of corrections", _with_tail("age_of_corrections_s", "age_of_corrections_high_s", 1, "s")),
+    ("Velocity later than the INS by", _behind_ins),
+)
+
+
+def _of(one: GnssReceiver, answer: GnssReception) -> str:
+    return f" of {one.topic}" if len(answer.receivers) > 1 else ""
+
+
+def _standstill(one: GnssReceiver, answer: GnssReception) -> list[Part | None]:
+    stood = one.standstill
+    if stood is None:
+        return []
+    pairs: list[tuple[str, str, str]] = [
+        ("Stood", f"{clock(stood.start_s)} to {clock(stood.end_s)}", f"{stood.samples} rows, {name_of(stood.state)}")
+    ]
+    if not stood.is_held:
+        seen = f"below {length_text(stood.resolution_m)}" if stood.is_coarse else length_text(stood.scatter_m)
+        pairs.append(("Horizontal scatter", seen, f"claimed: {_length(stood.claimed_m)}"))
+        if stood.up_scatter_m is not None:
+            pairs.append(
+                ("Vertical scatter", length_text(stood.up_scatter_m), f"claimed: {_length(stood.up_claimed_m)}")
+            )
+    if stood.speed_rms_mps is not None:
+        claimed = NOT_LOGGED if stood.claimed_mps is None else number(stood.claimed_mps, 3, "m/s")
+        pairs.append(("Speed shown, RMS", number(stood.speed_rms_mps, 3, "m/s"), f"claimed: {claimed}"))
+    return [
+        Facts(f"At standstill{_of(one, answer)}", pairs, with_full_stop(memory_of(stood))),
+        Figure("gnss.standstill", of=one.topic),
+    ]
+
+
+def _motion(one: GnssReceiver, answer: GnssReception) -> list[Part | None]:
+    motion = one.motion
+    if motion is None:
+        return [Figure("gnss.steps", of=one.topic)]
+    claimed = NOT_LOGGED if motion.claimed_mps is None else number(motion.claimed_mps, 3, "m/s")
+    pairs = [
+        (
+            "Velocity against position, RMS",
+            number(motion.difference_rms_mps, 3, "m/s"),
+            f"claimed σ: {claimed}; over {seconds_text(motion.seconds)}",
+        )
+    ]
+    if motion.lag_s is not None:
+        spread = number(motion.lag_sigma_s, 3, "s")
+        pairs.append(("Velocity later than position by", number(motion.lag_s, 3, "s", signed=True), f"± {spread}"))
+        pairs.append(("Left without that delay, RMS", number(motion.left_rms_mps, 3, "m/s"), ""))
+    return [Facts(f"Velocity against position{_of(one, answer)}", pairs), Figure("gnss.steps", of=one.topic)]
+
+
+def _losses(answer: GnssReception) -> Part | None:
+    rows: list[tuple[str, FixLoss]] = [(one.topic, loss) for one in answer.receivers for loss in one.losses]
+    if not rows:
+        return None
+    longest = sorted(sorted(rows, key=lambda row: -row[1].seconds)[:MOST_ROWS], key=lambda row: row[1].start_s)
+    heads = (
+        *(Head("Receiver"), Head("State"), Head("From"), Head("For", True)),
+        *(Head("Speed before", True), Head("Speed after", True), Head("Moved", True)),
+    )
+    told = [
+        (
+            *(topic, name_of(loss.state), clock(loss.start_s), seconds_text(loss.seconds)),
+            *(number(loss.speed_before_mps, 1, "m/s"), number(loss.speed_after_mps, 1, "m/s")),
+            "—" if loss.moved_m is None else length_text(loss.moved_m),
+        )
+        for topic, loss in longest
+    ]
+    return Grid("Losses and gaps", heads, told, _most(len(rows), "longest"))
+
+
+def _jumps(answer: GnssReception) -> Part | None:
+    rows: list[tuple[str, PositionJump]] = [(one.topic, jump) for one in answer.receivers for jump in one.jumps]
+    if not rows:
+        return None
+    largest = sorted(sorted(rows, key=lambda row: -row[1].size_m)[:MOST_ROWS], key=lambda row: row[1].time_s)
+    heads = (
+        *(Head("Receiver"), Head("At"), Head("Size", True), Head("Along the motion", True)),
+        *(Head("Up", True), Head("Fix"), Head("Time stamp off by", True)),
+    )
+    told = [
+        (
+            *(topic, clock(jump.time_s), length_text(jump.size_m)),
+            *(_signed(jump.along_m), _signed(jump.up_m)),
+            " → ".join(dict.fromkeys((name_of(jump.state_before), name_of(jump.state_after)))),
+            number(jump.time_shift_s, 2, "s", signed=True),
+        )
+        for topic, jump in largest
+    ]
+    found = sum(one.jumps_found for one in answer.receivers)
+    return Grid("Jumps of the position", heads, told, _most(found, "largest"))
+
+
+def _signed(value: float | None) -> str:
+    return number(value, 2, "m", signed=True)
+
+
+def _most(count: int, which: str) -> str:
+    return f"The {which} {MOST_ROWS} of {count}." if count > MOST_ROWS else ""
+
+
+def _pair(pair: ReceiverPair) -> Facts:
+    claimed = NOT_LOGGED if pair.claimed_m is None else length_text(pair.claimed_m)
+    pairs: list[tuple[str, str, str]] = [
+        (
+            "Distance in the plane",
+            length_text(pair.distance_m),
+            f"scatter {length_text(pair.distance_scatter_m)}; claimed by both: {claimed}",
+        )
+    ]
+
+    def add(label: str, value: Any, text: str, remark: str = "") -> None:
+        if value is not None:
+            pairs.append((label, text, remark))
+
+    scatter = "" if pair.up_scatter_m is None else f"scatter {length_text(pair.up_scatter_m)}"
+    add("Up", pair.up_m, number(pair.up_m, 2, "m", signed=True), scatter)
+    difference = pair.velocity_difference_rms_mps
+    add("Velocity difference, RMS", difference, number(difference, 3, "m/s"))
+    add("Antenna forward", pair.forward_m, number(pair.forward_m, 2, "m", signed=True), "by the track")
+    add("Antenna right", pair.right_m, number(pair.right_m, 2, "m", signed=True), "by the track")
+    lag_text = number(pair.lag_s, 3, "s", signed=True)
+    add("Later by", pair.lag_s, lag_text, f"± {number(pair.lag_sigma_s, 3, 's')}")
+    text = f"Both with a fix for {seconds_text(pair.seconds)}."
+    return Facts(f"{pair.second} from {pair.first}", pairs, text)

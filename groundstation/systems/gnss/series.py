@@ -1,0 +1,155 @@
+"""Rows of one receiver as arrays: places, velocities, states, time each row stands for."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.geodesy import SEMI_MAJOR_M, curvature_radii_m, on_earth
+from groundstation.base.records import BoolArray
+from groundstation.systems.gnss.answer import WITHOUT_FIX
+from groundstation.systems.gnss.settings import GnssSettings
+from groundstation.tables.gaps import largest_step_s
+from groundstation.tables.table import Flight, Table
+
+BURSTS, BURST_QUANTILE = 1.5, 0.9  # a step longer than most by so much is a gap
+REGULAR_SHARE, REGULAR_STEP = 0.8, 0.2  # steps within so much of the usual one make epochs that can be missed
+FIX_WITHOUT_INTEGRITY = ("none", "2d", "dead_reckoning", "other")  # of which a receiver never vouches
+
+
+@dataclass(frozen=True)
+class ReceiverRows:
+    """Rows of a receiver, one for each time.
+
+    Parameters
+    ----------
+    topic : str
+    table : Table
+    rows : int
+        Rows as logged.
+    time_s : ndarray, shape (n,)
+        Flight seconds.
+    latitude_deg, longitude_deg, up_m : ndarray, shape (n,)
+        Its places; NaN where there is none. Heights are above the ellipsoid where that is logged, else above the sea.
+    velocity_mps : ndarray, shape (n, 3)
+        North, east, up.
+    speed_mps : ndarray, shape (n,)
+        Horizontal.
+    state : ndarray of str, shape (n,)
+        Keys of ``answer.STATE_NAMES``.
+    step_s, gap_s : float
+        Usual step, and the longest that is no gap; NaN and infinity of a single row.
+    held_s : ndarray, shape (n,)
+        Seconds that each row stands for.
+    """
+
+    topic: str
+    table: Table
+    rows: int
+    time_s: FloatArray
+    latitude_deg: FloatArray
+    longitude_deg: FloatArray
+    up_m: FloatArray
+    velocity_mps: FloatArray
+    speed_mps: FloatArray
+    state: NDArray[np.str_]
+    step_s: float
+    gap_s: float
+    held_s: FloatArray
+
+    @property
+    def placeless(self) -> int:
+        """Number of rows that claim a fix without a place or a velocity."""
+        claims = ~np.isin(self.table.text("fix"), ("", "none"))
+        return int(np.count_nonzero(claims & (self.state == "none")))
+
+    @property
+    def resolution_m(self) -> float:
+        """Smallest change of a latitude, metres: the step in which places are logged."""
+        steps = np.abs(np.diff(self.latitude_deg))
+        steps = steps[steps > 1e-12]
+        return float(np.deg2rad(steps.min()) * SEMI_MAJOR_M) if steps.size else 0.0
+
+    @property
+    def has_fix(self) -> BoolArray:
+        """Tell which rows have a fix."""
+        return ~np.isin(self.state, WITHOUT_FIX)
+
+    def values(self, name: str) -> FloatArray:
+        """Values of a field, NaN where it is absent or a row has no fix."""
+        return np.where(self.has_fix, self.table.values(name), np.nan)
+
+    def plan_m(self, rows: NDArray[np.intp], latitude_deg: FloatArray, longitude_deg: FloatArray) -> FloatArray:
+        """Return north and east of some rows from places of their own, shape (k, 2)."""
+        meridian, prime_vertical = curvature_radii_m(latitude_deg)
+        north = np.deg2rad(self.latitude_deg[rows] - latitude_deg) * meridian
+        east = np.deg2rad(wrap_180(self.longitude_deg[rows] - longitude_deg)) * prime_vertical
+        return np.column_stack([north, east * np.cos(np.deg2rad(latitude_deg))])
+
+    @property
+    def is_gap(self) -> BoolArray:
+        """Tell behind which rows there is a gap, shape (n - 1,)."""
+        return np.diff(self.time_s) > self.gap_s
+
+    @property
+    def missed(self) -> int | None:
+        """Epochs that are missing between the first and the last row.
+
+        None where the rate is not regular.
+        """
+        steps = np.diff(self.time_s)
+        if not len(steps) or np.mean(np.abs(steps - self.step_s) <= REGULAR_STEP * self.step_s) < REGULAR_SHARE:
+            return None
+        return int(np.maximum(np.round(steps / self.step_s) - 1.0, 0.0).sum())
+
+
+def series_of(flight: Flight, topic: str, settings: GnssSettings) -> ReceiverRows:
+    """Return the rows of a receiver.
+
+    Repeated times are one row, with the first value of each field.
+    """
+    table = flight[topic].unique_times()
+    time_s = flight.seconds(table.time_ns)
+    steps = np.diff(time_s)
+    step_s = float(np.median(steps)) if len(steps) else np.nan
+    gap_s = largest_step_s(table.time_ns, settings.gap_steps, settings.gap_min_s)
+    if len(steps):  # of rows that come in bursts
+        gap_s = max(gap_s, BURSTS * float(np.quantile(steps, BURST_QUANTILE)))
+    usual_s = step_s if np.isfinite(step_s) else 0.0
+    held_s = np.append(np.where(steps > gap_s, usual_s, steps), usual_s)
+    velocity = np.column_stack([table.values(f"velocity_{axis}_mps") for axis in ("north", "east", "down")])
+    velocity[:, 2] *= -1.0
+    speed = np.hypot(velocity[:, 0], velocity[:, 1])
+    speed = np.where(np.isfinite(speed), speed, table.values("ground_speed_mps"))
+    latitude, longitude = on_earth(table.values("latitude_deg"), table.values("longitude_deg"))
+    name = "altitude_ellipsoid_m" if table.has("altitude_ellipsoid_m") else "altitude_msl_m"
+    return ReceiverRows(
+        topic,
+        table,
+        len(flight[topic]),
+        time_s,
+        latitude,
+        longitude,
+        table.values(name),
+        velocity,
+        speed,
+        _states(table, np.isfinite(latitude + longitude) | np.isfinite(speed)),
+        step_s,
+        gap_s,
+        held_s,
+    )
+
+
+def _states(table: Table, has_any: BoolArray) -> NDArray[np.str_]:
+    """Return the state of each row.
+
+    A fix that is claimed without a place and without a velocity is none: a receiver without a fix may leave latitude
+    and longitude 0 beside it.
+    """
+    claimed = table.text("fix").astype("<U16")
+    state = np.where(claimed != "", claimed, "fix")
+    state[~has_any] = "none"
+    is_doubted = (table.values("integrity_ok") == 0.0) & ~np.isin(state, FIX_WITHOUT_INTEGRITY)
+    state[is_doubted] = "integrity_lost"
+    return state

@@ -1,0 +1,113 @@
+"""Spells of the states of a receiver, shares of its time in them, and losses of the fix."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.angles import FloatArray
+from groundstation.systems.gnss.answer import STATE_NAMES, WITHOUT_FIX, WITHOUT_RECORD, FixLoss, FixState
+from groundstation.systems.gnss.series import ReceiverRows
+from groundstation.systems.gnss.settings import GnssSettings
+
+NO_RECORD, LOG_SILENT = "no_record", "log_silent"
+
+
+@dataclass(frozen=True)
+class Spells:
+    """Spells of one state each, in order of time and without holes between them."""
+
+    start_s: FloatArray
+    end_s: FloatArray
+    state: NDArray[np.str_]
+
+    @property
+    def seconds(self) -> FloatArray:
+        """Lengths of the spells."""
+        return self.end_s - self.start_s
+
+
+def spells_of(one: ReceiverRows, others_s: FloatArray | None) -> Spells:
+    """Return the spells of a receiver, gaps among them.
+
+    ``others_s`` are the times of all rows of other sensors, sorted; a gap in which none of them has a row is one of the
+    log. None where the log has no other sensor.
+    """
+    gap = np.flatnonzero(one.is_gap)
+    silent = np.full(len(gap), NO_RECORD, dtype=one.state.dtype)
+    if others_s is not None:
+        middle = 0.1 * (one.time_s[gap + 1] - one.time_s[gap])
+        first = np.searchsorted(others_s, one.time_s[gap] + middle)
+        behind = np.searchsorted(others_s, one.time_s[gap + 1] - middle)
+        silent[first == behind] = LOG_SILENT
+    state = np.insert(one.state, gap + 1, silent)
+    start = np.insert(one.time_s, gap + 1, (one.time_s + one.held_s)[gap])
+    first = np.flatnonzero(np.append(True, state[1:] != state[:-1]))
+    end = np.append(start[first[1:]], one.time_s[-1] + one.held_s[-1])
+    return Spells(start[first], end, state[first])
+
+
+def states_of(spells: Spells) -> tuple[FixState, ...]:
+    """Return the time in each state, the best state first."""
+    whole_s = float(spells.seconds.sum())
+    found = []
+    for name in (*STATE_NAMES, *sorted(set(spells.state.tolist()) - STATE_NAMES.keys())):
+        mine = spells.seconds[spells.state == name]
+        if mine.size:
+            seconds = float(mine.sum())
+            share = seconds / whole_s if whole_s > 0.0 else float(np.mean(spells.state == name))
+            found.append(FixState(name, seconds, share, int(mine.size), float(mine.max())))
+    return tuple(found)
+
+
+def losses_of(one: ReceiverRows, spells: Spells, settings: GnssSettings) -> tuple[FixLoss, ...]:
+    """Return stretches after the first fix without one, and gaps.
+
+    Single epochs without a fix are none.
+    """
+    with_fix = np.flatnonzero(one.has_fix)
+    if not with_fix.size:
+        return ()
+    losses = []
+    for kinds in (WITHOUT_FIX, WITHOUT_RECORD):
+        without = np.isin(spells.state, kinds)
+        edges = np.diff(np.concatenate([[0], without.astype(np.int8), [0]]))
+        for first, behind in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
+            start_s, end_s = float(spells.start_s[first]), float(spells.end_s[behind - 1])
+            if start_s <= one.time_s[with_fix[0]] or end_s - start_s <= settings.gap_min_s:
+                continue
+            longest = first + int(np.argmax(spells.seconds[first:behind]))
+            before, after = _around(one, with_fix, start_s, end_s)
+            losses.append(_loss(one, str(spells.state[longest]), start_s, end_s, before, after))
+    return tuple(sorted(losses, key=lambda loss: loss.start_s))
+
+
+def seconds_after_first_fix(one: ReceiverRows, spells: Spells, kinds: tuple[str, ...]) -> float:
+    """Return the time in some states after the first fix."""
+    with_fix = np.flatnonzero(one.has_fix)
+    if not with_fix.size:
+        return 0.0
+    mine = np.isin(spells.state, kinds) & (spells.start_s > one.time_s[with_fix[0]])
+    return float(spells.seconds[mine].sum())
+
+
+def _around(one: ReceiverRows, with_fix: NDArray[np.intp], start_s: float, end_s: float) -> tuple[int, int | None]:
+    """Return the last row with a fix before a loss, and the first one after it."""
+    at = int(np.searchsorted(one.time_s[with_fix], start_s))
+    later = int(np.searchsorted(one.time_s[with_fix], end_s - 1e-6))
+    return int(with_fix[at - 1]), int(with_fix[later]) if later < len(with_fix) else None
+
+
+def _loss(one: ReceiverRows, state: str, start_s: float, end_s: float, before: int, after: int | None) -> FixLoss:
+    speeds = [known(one.speed_mps[row]) if row is not None else None for row in (before, after)]
+    moved_m = None
+    if after is not None:
+        rows = np.array([after])
+        plan = one.plan_m(rows, one.latitude_deg[[before]], one.longitude_deg[[before]])[0]
+        moved_m = known(float(np.hypot(*plan)))
+    return FixLoss(state, start_s, end_s, end_s - start_s, speeds[0], speeds[1], moved_m)
+
+
+def known(value: float) -> float | None:
+    """Return a number, None where it is not finite."""
+    return float(value) if np.isfinite(value) else None

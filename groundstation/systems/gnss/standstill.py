@@ -1,0 +1,192 @@
+"""Scatter of a receiver at standstill against the claimed sigmas, duration of errors."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.angles import FloatArray
+from groundstation.base.records import BoolArray
+from groundstation.systems.gnss.answer import COARSE, StandstillScatter
+from groundstation.systems.gnss.series import ReceiverRows
+from groundstation.systems.gnss.settings import GnssSettings
+from groundstation.systems.gnss.spells import known
+from groundstation.tables.motion import runs
+from groundstation.tables.phases import Phases
+
+IN_MOTION = ("take-off run", "airborne", "landing roll")
+CREEP = 0.2  # of the speed that stands: the mean over the whole of it may be no more
+MOVED_SIGMAS, LEAST_MOVED_M = 4.0, 0.02  # a place that moves by more than its claimed sigma allows does not stand
+LEAST_AVERAGES = 4  # means of one length that make a scatter
+HELD_SHARE = 0.9  # share of rows at the place of the row before: the receiver repeats it
+
+
+class Stood(NamedTuple):
+    """Standstill with its rows, their places about the mean, and the scatter of means."""
+
+    answer: StandstillScatter
+    rows: NDArray[np.intp]
+    offset_m: FloatArray
+    averaged_s: FloatArray
+    scatter_m: FloatArray
+
+
+def standstill_of(one: ReceiverRows, phases: Phases, settings: GnssSettings) -> Stood | None:
+    """Return the longest standstill with one kind of fix; None without one long enough."""
+    if len(one.time_s) < settings.standstill_samples_min:
+        return None
+    still = _is_still(one, settings) & ~np.isin(phases.at(one.time_s), IN_MOTION)
+    still &= np.isfinite(one.latitude_deg) & np.isfinite(one.longitude_deg) & one.has_fix
+    breaks = np.append(False, one.is_gap | (one.state[1:] != one.state[:-1]))
+    best: tuple[float, NDArray[np.intp]] | None = None
+    for first, behind in runs(still):
+        cuts = first + 1 + np.flatnonzero(breaks[first + 1 : behind])
+        for start, end in zip([first, *cuts], [*cuts, behind], strict=True):
+            rows = np.arange(start, end)
+            time_s = one.time_s[rows]
+            inside = (time_s >= time_s[0] + settings.standstill_guard_s) & (
+                time_s <= time_s[-1] - settings.standstill_guard_s
+            )
+            rows = rows[inside]
+            if len(rows) < settings.standstill_samples_min:
+                continue
+            length_s = float(one.time_s[rows[-1]] - one.time_s[rows[0]])
+            is_longest = length_s >= settings.standstill_min_s and (best is None or length_s > best[0])
+            if is_longest and not _creeps(one, rows, settings):
+                best = length_s, rows
+    return None if best is None else _judged(one, best[1])
+
+
+def _is_still(one: ReceiverRows, settings: GnssSettings) -> BoolArray:
+    """Tell where the mean velocity about a row is that of something that stands.
+
+    Without velocities, where the mean places before and behind it are the same.
+    """
+    half_s = 0.5 * settings.still_window_s
+    has_velocity = np.isfinite(one.velocity_mps[:, 0])
+    if has_velocity.mean() > 0.5:
+        mean = _window_mean(one.time_s, one.velocity_mps[:, :2], -half_s, half_s)
+        return np.asarray(np.hypot(mean[:, 0], mean[:, 1]) < settings.still_mps)
+    if np.isfinite(one.speed_mps).mean() > 0.5:
+        mean = _window_mean(one.time_s, one.speed_mps[:, None], -half_s, half_s)
+        return np.asarray(mean[:, 0] < settings.still_mps)
+    place = np.column_stack([one.latitude_deg, one.longitude_deg])
+    before = _window_mean(one.time_s, place, -settings.still_window_s, 0.0)
+    behind = _window_mean(one.time_s, place, 0.0, settings.still_window_s)
+    sigma_m = one.table.values("horizontal_sigma_m")
+    limit_m = np.full(len(place), settings.still_mps * settings.still_window_s)
+    limit_m = np.where(
+        np.isfinite(sigma_m), np.minimum(limit_m, np.maximum(MOVED_SIGMAS * sigma_m, LEAST_MOVED_M)), limit_m
+    )
+    moved_deg = behind - before
+    moved_m = np.deg2rad(moved_deg) * 6.37e6 * np.column_stack([np.ones(len(place)), np.cos(np.deg2rad(place[:, 0]))])
+    return np.asarray(np.hypot(moved_m[:, 0], moved_m[:, 1]) < limit_m)
+
+
+def _window_mean(time_s: FloatArray, values: FloatArray, from_s: float, to_s: float) -> FloatArray:
+    """Mean of the finite values between two moments about each row, NaN without any.
+
+    Its shape is that of the values.
+    """
+    is_known = np.isfinite(values)
+    first = np.searchsorted(time_s, time_s + from_s - 1e-9, side="left")
+    behind = np.searchsorted(time_s, time_s + to_s + 1e-9, side="right")
+    middle = np.nanmean(values, axis=0) if is_known.any() else np.zeros(values.shape[1])
+    total = np.vstack([np.zeros(values.shape[1]), np.cumsum(np.where(is_known, values - middle, 0.0), axis=0)])
+    count = np.vstack([np.zeros(values.shape[1]), np.cumsum(is_known, axis=0)])
+    number = count[behind] - count[first]
+    return np.where(number > 0, middle + (total[behind] - total[first]) / np.maximum(number, 1), np.nan)
+
+
+def _creeps(one: ReceiverRows, rows: NDArray[np.intp], settings: GnssSettings) -> bool:
+    """Tell whether the mean velocity of a whole standstill is that of a slow motion."""
+    velocity = one.velocity_mps[rows, :2]
+    if not np.isfinite(velocity).any():
+        return False
+    return float(np.hypot(*np.nanmean(velocity, axis=0))) > CREEP * settings.still_mps
+
+
+def _judged(one: ReceiverRows, rows: NDArray[np.intp]) -> Stood:
+    middle = np.mean(one.latitude_deg[rows]), np.mean(one.longitude_deg[rows])
+    plan = one.plan_m(rows, np.full(len(rows), middle[0]), np.full(len(rows), middle[1]))
+    up = one.up_m[rows] - np.nanmean(one.up_m[rows]) if np.isfinite(one.up_m[rows]).any() else one.up_m[rows]
+    offset = np.column_stack([plan - plan.mean(axis=0), up])
+    step_s = float(np.median(np.diff(one.time_s[rows])))
+    length_s = float(one.time_s[rows[-1]] - one.time_s[rows[0]])
+    resolution_m = one.resolution_m
+    is_coarse = resolution_m > COARSE * _spread(offset[:, :2])
+    is_held = not is_coarse and bool(np.mean(np.all(np.diff(offset[:, :2], axis=0) == 0.0, axis=1)) > HELD_SHARE)
+    correlation_s = None if is_held or is_coarse else correlation_time_s(offset[:, :2], step_s)
+    independent = 1.0
+    if correlation_s is not None:
+        independent = max(min(length_s / max(2.0 * correlation_s, step_s), float(len(rows))), 1.0)
+    averaged_s, scatter = scatter_of_means(offset[:, :2], step_s)
+    speed = one.speed_mps[rows]
+    answer = StandstillScatter(
+        start_s=float(one.time_s[rows[0]]),
+        end_s=float(one.time_s[rows[-1]]),
+        state=str(one.state[rows[0]]),
+        samples=len(rows),
+        scatter_m=_spread(offset[:, :2]),
+        up_scatter_m=known(_spread(offset[:, 2:][np.isfinite(offset[:, 2])])),
+        claimed_m=_median(one.table.values("horizontal_sigma_m")[rows]),
+        up_claimed_m=_median(one.table.values("vertical_sigma_m")[rows]),
+        correlation_s=correlation_s,
+        independent=independent,
+        speed_rms_mps=known(float(np.sqrt(np.nanmean(speed**2)))) if np.isfinite(speed).any() else None,
+        claimed_mps=_median(one.table.values("velocity_sigma_mps")[rows]),
+        resolution_m=resolution_m,
+        is_held=is_held,
+    )
+    return Stood(answer, rows, offset, averaged_s, scatter)
+
+
+def _median(values: FloatArray) -> float | None:
+    values = values[np.isfinite(values)]
+    return float(np.median(values)) if values.size else None
+
+
+def _spread(offset_m: FloatArray) -> float:
+    """Standard deviation about the mean, axes together; NaN of fewer than two."""
+    if len(offset_m) < 2:
+        return float("nan")
+    return float(np.sqrt(np.var(offset_m, axis=0, ddof=1).sum()))
+
+
+def correlation_time_s(offset_m: FloatArray, step_s: float) -> float | None:
+    """Return the time after which errors are correlated by less than 1/e.
+
+    None where that is longer than a quarter of the samples.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(1).normal(size=(400, 2))
+    >>> correlation_time_s(noise, 0.5)
+    0.5
+    >>> correlation_time_s(np.cumsum(noise, axis=0), 0.5) is None
+    True
+    """
+    count = len(offset_m)
+    size = 1 << (2 * count - 1).bit_length()
+    spectrum = np.fft.rfft(offset_m - offset_m.mean(axis=0), size, axis=0)
+    together = np.fft.irfft((np.abs(spectrum) ** 2).sum(axis=1), size)[: count // 4 + 1]
+    if len(together) < 2 or not together[0] > 0.0:
+        return None
+    below = np.flatnonzero(together / together[0] < np.exp(-1.0))
+    return float(below[0] * step_s) if below.size else None
+
+
+def scatter_of_means(offset_m: FloatArray, step_s: float) -> tuple[FloatArray, FloatArray]:
+    """Return times of averaging, doubled each time, and the scatter of the means over them.
+
+    Errors without memory fall by the root of the time; errors that last do not fall.
+    """
+    sizes, scatter = [], []
+    size = 1
+    while len(offset_m) // size >= LEAST_AVERAGES:
+        count = len(offset_m) // size
+        means = offset_m[: count * size].reshape(count, size, -1).mean(axis=1)
+        sizes.append(size * step_s)
+        scatter.append(_spread(means))
+        size *= 2
+    return np.array(sizes), np.array(scatter)

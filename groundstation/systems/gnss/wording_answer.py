@@ -1,0 +1,151 @@
+"""Words for a receiver's reception: the sentence, lengths, shares, times."""
+
+from collections.abc import Iterable
+
+from groundstation.systems.gnss.answer import STATE_NAMES, WITHOUT_FIX, WITHOUT_RECORD, GnssReceiver, StandstillScatter
+
+FIXED = frozenset(STATE_NAMES) - {*WITHOUT_FIX, *WITHOUT_RECORD}
+NEVER_A_FIX = "GNSS never had a fix"
+WHOLE = 0.9995  # share that is all
+STEP_TOLD = 0.5  # of the scatter: a coarser step of the logged places is told
+FEW = 4  # states that the sentence names
+CENTIMETRES_BELOW_M = 0.995
+
+
+def never_had(one: GnssReceiver) -> str:
+    """Return the sentence of a receiver that never had a fix."""
+    most = one.satellites_tracked if one.satellites_used is None else one.satellites_used
+    satellites = "" if most is None else f", {'at most ' if most else ''}{most:.0f} satellite{'s' * (most != 1)}"
+    return f"{NEVER_A_FIX}: {one.rows} row{'s' * (one.rows != 1)}{satellites}"
+
+
+def sentence_of(one: GnssReceiver) -> str:
+    """Return one sentence on a receiver."""
+    if one.first_fix_s is None:
+        return never_had(one)
+    told = [_first_fix(one) + listed((_states(one), _lost(one)))]
+    if one.satellites_used is not None:
+        told.append(f"{one.satellites_used:.0f} satellites")
+    if one.standstill is not None and (scatter := scatter_of(one.standstill)):
+        told.append(scatter)
+    return "; ".join(told)
+
+
+def _states(one: GnssReceiver) -> str:
+    fixes = [(state.state, one.share_after_first_fix(state.state)) for state in one.states]
+    fixes = sorted((pair for pair in fixes if pair[0] in FIXED), key=lambda pair: -pair[1])
+    if len(fixes) == 1 and (fixes[0][1] >= WHOLE or one.start_s == one.end_s):
+        name = name_of(fixes[0][0])
+        return name if one.start_s == one.end_s else f"{name} throughout"
+    return ", ".join(f"{name_of(state)} {share_text(share)}" for state, share in fixes[:FEW])
+
+
+def _first_fix(one: GnssReceiver) -> str:
+    waited_s = (one.first_fix_s or 0.0) - one.start_s
+    return f"first fix after {seconds_text(waited_s)}, then " if waited_s >= 1.0 else ""
+
+
+def _lost(one: GnssReceiver) -> str:
+    if one.start_s == one.end_s:
+        return ""
+    lost = [loss.seconds for loss in one.losses if loss.state in WITHOUT_FIX]
+    gaps = [loss.seconds for loss in one.losses if loss.state not in WITHOUT_FIX]
+    told = [_times("lost", lost), _times("nothing recorded", gaps)]
+    if not lost and one.lost_s > 0.0:
+        told[0] = f"lost for {seconds_text(one.lost_s)}"
+    return listed(told) or "nothing lost"
+
+
+def _times(what: str, seconds: list[float]) -> str:
+    if not seconds:
+        return ""
+    longest = seconds_text(max(seconds))
+    return f"{what} for {longest}" if len(seconds) == 1 else f"{what} {len(seconds)} times, at most {longest}"
+
+
+def scatter_of(stood: StandstillScatter) -> str:
+    """Return scatter at standstill beside what is claimed.
+
+    Empty where the receiver holds its place.
+    """
+    if stood.is_held:
+        return ""
+    claimed = "" if stood.claimed_m is None else f" where {length_text(stood.claimed_m)} is claimed"
+    if stood.is_coarse:
+        return f"scatter below {length_text(stood.resolution_m)}{claimed}"
+    return f"scatter {length_text(stood.scatter_m)}{claimed}"
+
+
+def memory_of(stood: StandstillScatter) -> str:
+    """Return how long errors last, and what that says of the scatter."""
+    length_s = stood.end_s - stood.start_s
+    if stood.is_held:
+        return "the receiver repeats one position while it stands: its scatter says nothing"
+    step = f"places are logged in steps of {length_text(stood.resolution_m)}"
+    if stood.is_coarse:
+        return f"{step}: finer scatter is not seen"
+    if stood.correlation_s is None:
+        return (
+            f"it stood for {seconds_text(length_s)} and errors last longer than {seconds_text(length_s / 4.0)}: "
+            "the scatter understates the error"
+        )
+    return (
+        f"it stood for {seconds_text(length_s)}, errors last about {seconds_text(stood.correlation_s)}: "
+        f"{stood.independent:.0f} independent value{'s' * (round(stood.independent) != 1)}"
+    ) + (f"; {step}" if stood.resolution_m > STEP_TOLD * stood.scatter_m else "")
+
+
+def name_of(state: str) -> str:
+    """Return a state in words."""
+    return STATE_NAMES.get(state, state)
+
+
+def share_text(share: float) -> str:
+    """Return a share in per cent.
+
+    Examples
+    --------
+    >>> share_text(0.651), share_text(0.0042), share_text(0.9961), share_text(0.00001)
+    ('65 %', '0.4 %', '99.6 %', '< 0.1 %')
+    """
+    percent = 100.0 * share
+    if 0.0 < percent < 0.1:
+        return "< 0.1 %"
+    return f"{percent:.1f} %" if percent < 1.0 or 99.0 < percent < 100.0 else f"{percent:.0f} %"
+
+
+def length_text(metres: float) -> str:
+    """Return a length with two digits, in centimetres below a metre.
+
+    Examples
+    --------
+    >>> length_text(0.0094), length_text(0.31), length_text(1.34), length_text(181.2)
+    ('0.9 cm', '31 cm', '1.3 m', '181 m')
+    """
+    if metres < CENTIMETRES_BELOW_M:
+        return f"{100.0 * metres:.1f} cm" if metres < 0.0995 else f"{100.0 * metres:.0f} cm"
+    return f"{metres:.1f} m" if metres < 10.0 else f"{metres:.0f} m"
+
+
+def seconds_text(seconds: float) -> str:
+    """Return a time.
+
+    Examples
+    --------
+    >>> seconds_text(0.25), seconds_text(12.4), seconds_text(134.0), seconds_text(3725.0)
+    ('0.25 s', '12 s', '2:14 min', '1:02 h')
+    """
+    if seconds < 9.95:
+        return f"{seconds:.2g} s"
+    if seconds < 99.5:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60.0) if seconds >= 3600.0 else int(seconds // 60.0)
+    if seconds >= 3600.0:
+        return f"{minutes // 60}:{minutes % 60:02d} h"
+    whole = round(seconds)
+    return f"{whole // 60}:{whole % 60:02d} min"
+
+
+def listed(parts: Iterable[str]) -> str:
+    """Join parts by commas, leaving out empty ones."""
+    return ", ".join(filter(None, parts))
