@@ -13,9 +13,10 @@ from groundstation.base.findings import Finding
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.signals import topics_of_kind
 from groundstation.systems.inertial.answer import CHANNELS, Difference, InertialResult, OwnInnovation
+from groundstation.systems.inertial.departures import departures, filter_of_ins, findings_of
 from groundstation.systems.inertial.differences import InsDifferences, differences
 from groundstation.systems.inertial.figures import differences_figure, own_innovations_figure, plain_track_figure
-from groundstation.systems.inertial.kind import WHY_NOT
+from groundstation.systems.inertial.kind import LEAST_AIDED_S, WHY_NOT
 from groundstation.systems.inertial.model import FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.tables.gaps import seconds_covered
@@ -56,7 +57,9 @@ def compare_aided(
     findings : tuple of Finding
         Those of the comparison, and that nothing is estimated.
     """
-    compared = differences(flight, settings=replace(settings, jump_m=ANY_JUMP_M), excluded_s=excluded_s)
+    least_s = min(settings.least_gnss_s, LEAST_AIDED_S) if kind[0] == AIDED else settings.least_gnss_s
+    shown = replace(settings, jump_m=ANY_JUMP_M, least_gnss_s=least_s)
+    compared = differences(flight, settings=shown, excluded_s=excluded_s)
     epochs, own = compared.epochs, own_innovations(flight)
     figures = (differences_figure(compared), plain_track_figure(compared))
     result = InertialResult(
@@ -70,11 +73,17 @@ def compare_aided(
         differences=_differences(compared),
         own_filter="" if own is None else own.topic.removeprefix("raw."),
         own_innovations=() if own is None else _innovations(own),
+        departures=departures(flight, compared, own) if kind[0] == AIDED else (),
+        filter_of_ins=filter_of_ins(flight, compared.ins_topic),
         figures=figures if own is None else (*figures, own_innovations_figure(flight, own)),
     )
     code, says = CODES[kind[0]], WHY_NOT[kind[0]]
     text = f"{says} ({kind[1]}): INS minus GNSS is shown, errors and forecast are not estimated"
-    return result, (*compared.findings, Finding("info", code, text, compared.ins_topic))
+    position = result.difference("position")
+    left = findings_of(
+        result.departures, result.filter_of_ins, None if position is None else position.median, compared.ins_topic
+    )
+    return result, (*compared.findings, Finding("info", code, text, compared.ins_topic), *left)
 
 
 def _differences(compared: InsDifferences) -> tuple[Difference, ...]:

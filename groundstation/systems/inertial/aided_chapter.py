@@ -5,7 +5,7 @@ INS - GNSS, and the innovations that its own filter logged.
 
 from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, kept
 from groundstation.chapters.wording import ABSENT, any_value, clock, number, percent, typeset, unit_sign
-from groundstation.systems.inertial.answer import Difference, InertialResult, OwnInnovation
+from groundstation.systems.inertial.answer import Departure, Difference, InertialResult, OwnInnovation
 
 TITLE = "INS against GNSS"
 HEADLINES = {"gnss_aided": "GNSS corrects this INS", "unknown": "It is not known whether GNSS corrects this INS"}
@@ -19,6 +19,7 @@ def aided(answer: InertialResult) -> Section:
     is_known = answer.kind == "gnss_aided"
     within = f": within {number(position.p95, 1, 'm')} of it (95 %)" if position is not None and is_known else ""
     parts: tuple[Part | None, ...] = (
+        _departures(answer),
         _why(answer),
         _differences(answer.differences),
         Figure("inertial.differences", of="position"),
@@ -26,7 +27,8 @@ def aided(answer: InertialResult) -> Section:
         _innovations(answer),
         Figure("inertial.own_innovations"),
     )
-    headline = f"{HEADLINES[answer.kind]}{within}"
+    left = answer.worst_departure
+    headline = f"{HEADLINES[answer.kind]}{within}" if left is None else _left(answer, left)
     return Section(
         "inertial", TITLE, LEAD, kept(parts), headline, claim=_claim(answer, headline), appendix=(_pair(answer),)
     )
@@ -42,8 +44,46 @@ def _claim(answer: InertialResult, headline: str) -> Claim:
     sentences = (f"{reason[:1].upper()}{reason[1:]}.",) if reason else ()
     value = figures[0][1] if figures else ""
     remark = "INS − GNSS, 95 %; its own drift cannot be seen" if figures else "its own drift cannot be seen"
+    left = answer.worst_departure
+    if left is not None:
+        flew = answer.filter_of_ins.use.removeprefix("; ")
+        use = (f"{flew[:1].upper()}{typeset(flew[1:])}.",) if flew else ()
+        remark = f"INS − GNSS at most, for {clock(left.end_s - left.start_s)} min:s from {clock(left.start_s)}"
+        value = number(left.largest_m, 0, "m")
+        mark = Mark("warn" if answer.filter_of_ins.flew is False else "bad", "Left GNSS")
+        return Claim(Rank.INERTIAL_OPEN, mark, headline, value, remark, (*use, *sentences), figures, is_danger=True)
     word = "Aided" if answer.kind == "gnss_aided" else "Open"
     return Claim(Rank.INERTIAL_OPEN, Mark("unknown", word), headline, value, remark, sentences, figures)
+
+
+def _left(answer: InertialResult, left: Departure) -> str:
+    """Return the headline on the worst departure."""
+    span = f"{clock(left.start_s)} to {clock(left.end_s)}"
+    not_flown = " (it did not fly the aircraft)" if answer.filter_of_ins.flew is False else ""
+    return f"{answer.filter_of_ins.title} and GNSS {left.apart}apart, {span}{not_flown}"
+
+
+def _departures(answer: InertialResult) -> Grid | None:
+    """Return the spans in which filter and GNSS were far apart."""
+    if not answer.departures:
+        return None
+    heads = (
+        *(Head("From", True), Head("To", True), Head("Position, m", True), Head("Velocity, m/s", True)),
+        *(Head("Beyond its gate", True), Head("")),
+    )
+    rows = [
+        (
+            *(clock(one.start_s), clock(one.end_s), number(one.largest_m, 1), number(one.largest_mps, 1)),
+            ABSENT if one.share_rejected is None else percent(one.share_rejected, 0),
+            "the filter had just begun" if one.at_start else Mark("warn", "left GNSS"),
+        )
+        for one in answer.departures
+    ]
+    caption = (
+        "Spans of at least 5 s in which INS and GNSS were further apart than ten times their median, 10 m or 3 m/s, "
+        "or the filter rejected GNSS. Largest horizontal differences. Which of the two was wrong they do not tell."
+    )
+    return Grid("Departures from GNSS", heads, rows, caption)
 
 
 def _why(answer: InertialResult) -> Note:

@@ -108,6 +108,10 @@ def _sentence(answers: Answers) -> str:
         position = inertial.difference("position")
         says = "INS corrected by GNSS" if inertial.kind == "gnss_aided" else "INS perhaps corrected by GNSS"
         within = "" if position is None else f", within {position.p95:.1f} m of it (95 %)"
+        left = inertial.worst_departure
+        if left is not None:
+            of = inertial.filter_of_ins
+            return f"{of.title} and GNSS {left.apart}apart for {left.end_s - left.start_s:.0f} s{of.use}"
         return f"{says}{within}: no errors, no forecast"
     parts = []
     if inertial.radial_error_rate_fit_nmiph is not None:

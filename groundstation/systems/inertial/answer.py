@@ -133,6 +133,63 @@ class OwnInnovation:
 
 
 @dataclass(frozen=True)
+class Departure:
+    """Span in which an aided INS and GNSS were far further apart than usual. Times are flight seconds.
+
+    Parameters
+    ----------
+    start_s, end_s : float
+    largest_m, largest_mps : float or None
+        Largest horizontal difference of position and velocity; None where it is not known.
+    share_rejected : float or None
+        Share of the span in which the filter was beyond its own gate for GNSS; None where it logs none.
+    at_start : bool
+        Whether the comparison had begun less than 30 s before: the filter was still finding its place.
+    """
+
+    start_s: float
+    end_s: float
+    largest_m: float | None
+    largest_mps: float | None
+    share_rejected: float | None = None
+    at_start: bool = False
+
+    @property
+    def apart(self) -> str:
+        """Words on how far: "up to 181 m and 29.7 m/s "; empty where neither is known."""
+        sizes = (
+            "" if self.largest_m is None else f"{self.largest_m:.3g} m",
+            "" if self.largest_mps is None else f"{self.largest_mps:.3g} m/s",
+        )
+        told = " and ".join(filter(None, sizes))
+        return f"up to {told} " if told else ""
+
+
+@dataclass(frozen=True)
+class FilterOfIns:
+    """Estimator that an INS topic is of, and whether it flew the aircraft.
+
+    ``flew`` is None where the log does not tell; ``source`` is the parameter or field that does.
+    """
+
+    name: str = ""
+    flew: bool | None = None
+    source: str = ""
+
+    @property
+    def title(self) -> str:
+        """Name at the head of a line."""
+        return self.name or "INS"
+
+    @property
+    def use(self) -> str:
+        """Words on its use, to stand behind others."""
+        if self.flew is None:
+            return ""
+        return f"; it {'flew' if self.flew else 'did not fly'} the aircraft ({self.source})"
+
+
+@dataclass(frozen=True)
 class NavigationStart:
     """Moment from which an INS navigates, and the evidence for it.
 
@@ -183,6 +240,8 @@ class InertialResult(Answer, KindOfIns, AzimuthByTurns, BestTrack, ErrorsAlongTh
     own_filter : str
         Topic of the log in which that INS tells of its own filter, empty where it does not; ``own_innovations`` are
         what it tells.
+    departures : tuple of Departure
+        Spans in which an INS that GNSS corrects left it, in order of time; ``filter_of_ins`` is the estimator it is of.
     outages : tuple of RealOutage
         Intervals of the log itself without GNSS or without the INS.
     reopened : int
@@ -222,6 +281,8 @@ class InertialResult(Answer, KindOfIns, AzimuthByTurns, BestTrack, ErrorsAlongTh
     differences: tuple[Difference, ...] = ()
     own_filter: str = ""
     own_innovations: tuple[OwnInnovation, ...] = ()
+    departures: tuple[Departure, ...] = ()
+    filter_of_ins: FilterOfIns = field(default_factory=FilterOfIns)
     outages: tuple[RealOutage, ...] = ()
     azimuth: AzimuthEstimate | None = None
     reopened: int = 0
@@ -237,6 +298,12 @@ class InertialResult(Answer, KindOfIns, AzimuthByTurns, BestTrack, ErrorsAlongTh
     def difference(self, quantity: str, axis: str = "horizontal") -> Difference | None:
         """INS minus GNSS of a quantity along an axis, None where there is none."""
         return next((row for row in self.differences if (row.quantity, row.axis) == (quantity, axis)), None)
+
+    @property
+    def worst_departure(self) -> Departure | None:
+        """The departure with the largest distance; those of a filter that had just begun do not count."""
+        found = [one for one in self.departures if not one.at_start]
+        return max(found, key=lambda one: (one.largest_m or 0.0, one.largest_mps or 0.0), default=None)
 
     def best_track(self, results: FlightResults) -> CorrectedPosition | None:
         """The rows with a place and sigmas; None of an INS that was not corrected."""

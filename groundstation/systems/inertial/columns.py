@@ -6,6 +6,12 @@ from groundstation.systems.inertial.forecast_answer import ForecastResult
 
 INERTIAL_COLUMNS: tuple[AnswerColumn[InertialResult], ...] = (
     AnswerColumn("ins_kind", "category", "unaided, gnss_aided or unknown", lambda inertial: inertial.kind),
+    AnswerColumn(
+        "departure_m",
+        "number",
+        "largest distance of an aided INS from GNSS where it left it",
+        lambda inertial: None if inertial.worst_departure is None else inertial.worst_departure.largest_m,
+    ),
     AnswerColumn("radial_error_rate_fit_nmiph", "number", "INS radial position error rate, time-position fit"),
     AnswerColumn("radial_error_rate_50_nmiph", "number", "the same, median over time"),
     AnswerColumn("radial_error_rate_95_nmiph", "number", "the same, not exceeded 95 % of the time"),

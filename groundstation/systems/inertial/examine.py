@@ -1,16 +1,19 @@
 """Shortfalls of a flight for an estimate of INS errors, by comparison with GNSS alone."""
 
+from contextlib import suppress
+from dataclasses import replace
+
 import numpy as np
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.methods.roles import InsKinds
 from groundstation.systems.analysis import Shortfall
 from groundstation.systems.inertial.differences import InsDifferences, differences
-from groundstation.systems.inertial.kind import WHY_NOT, kind_of, stated_kind
+from groundstation.systems.inertial.kind import LEAST_AIDED_S, WHY_NOT, kind_of, stated_kind
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.known import Known
 from groundstation.tables.gaps import seconds_covered
-from groundstation.tables.sources import UNAIDED, said_of
+from groundstation.tables.sources import AIDED, UNAIDED, said_of
 from groundstation.tables.table import Flight
 
 LEAST_COVERED = 0.95  # of the time of the INS: more without GNSS is worth a word
@@ -22,11 +25,25 @@ def compared_with_kind(
 ) -> tuple[InsDifferences, tuple[str, str]]:
     """Return INS minus GNSS of a flight, and whether GNSS corrects the INS, with the reason.
 
+    An INS that GNSS corrects is compared even over 20 s: nothing of it is estimated.
+
     Raises
     ------
     NotAssessableError
         As :func:`groundstation.systems.inertial.differences.differences`.
     """
+    try:
+        return _with_kind(flight, known, settings)
+    except NotAssessableError:
+        short = replace(settings, least_gnss_s=min(settings.least_gnss_s, LEAST_AIDED_S))
+        with suppress(NotAssessableError):
+            compared, kind = _with_kind(flight, known, short)
+            if kind[0] == AIDED:
+                return compared, kind
+        raise
+
+
+def _with_kind(flight: Flight, known: Known, settings: InertialSettings) -> tuple[InsDifferences, tuple[str, str]]:
     compared = differences(flight, settings=settings, excluded_s=known.excluded_s)
     said = said_of(flight, compared.ins_topic, "ins_kind")
     return compared, kind_of(compared, settings, stated_kind(known.aircraft.ins_kind, {"ins_kind": said}))

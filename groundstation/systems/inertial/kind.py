@@ -9,6 +9,7 @@ from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.tables.sources import AIDED, HALF, STATED, UNAIDED, UNKNOWN
 
 WHY_NOT = {AIDED: "GNSS corrects this INS already", UNKNOWN: "it is not known whether GNSS corrects this INS"}
+LEAST_AIDED_S = 20.0  # of an INS that GNSS corrects nothing is estimated: so little suffices to show the differences
 MINUTE_S, LEAST_MINUTES = 60.0, 5.0
 AT_REST_MPS = 5.0
 DRIFT_MPS = 0.005  # an INS that stays below has not drifted: 0.01 nmi/h

@@ -14,6 +14,7 @@ from groundstation.plots.marks import AnyMark, Band, Curve, Dots, Floats, Limit,
 from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import finite, padded, symmetric
 from groundstation.results.flight import FlightResults
+from groundstation.systems.inertial.answer import InertialResult
 from groundstation.systems.inertial.arrays import (
     InertialDifferences,
     InertialObservability,
@@ -219,19 +220,30 @@ def differences(results: FlightResults, quantity: str) -> Plot | None:
     north, east = (one.position_m if quantity == "position" else one.velocity_mps for one in (data.north, data.east))
     if not has_values(north, east):
         return None
-    rows = []
+    rows, left = [], _departures(results)
     for channel, values in (("north", north), ("east", east)):
-        marks = (ZERO, Dots(x=data.time_s, y=values, role="ins"))
+        marks = (*left, ZERO, Dots(x=data.time_s, y=values, role="ins"))
         panel = Panel(marks, time_axis(*span(data.time_s)), Axis(f"{channel}, {UNITS[quantity]}"), legend="")
         rows.append(Row((panel,), 28.0, shares_x=channel == "north"))
     return Plot(
         f"inertial.differences.{quantity}",
         f"INS − GNSS, {quantity}",
-        "Every epoch with both INS and GNSS. A slow wave here is not a Schuler oscillation.",
+        "Every epoch with both INS and GNSS. A slow wave here is not a Schuler oscillation."
+        + (" Shaded: departures from GNSS." if left else ""),
         f"INS minus GNSS, {quantity} north and east, over flight time.",
         tuple(rows),
         ("inertial_differences",),
     )
+
+
+def _departures(results: FlightResults) -> tuple[AnyMark, ...]:
+    """Return the spans in which the INS left GNSS, shaded."""
+    answer = results.answer(InertialResult)
+    found = () if answer is None else answer.departures
+    if not found:
+        return ()
+    start, end = np.array([one.start_s for one in found]), np.array([one.end_s for one in found])
+    return (Spans(start=start, end=end, kind=np.full(len(found), ""), role="warn", name="apart"),)
 
 
 def own_innovations(results: FlightResults) -> Plot | None:
