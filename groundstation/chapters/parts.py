@@ -129,10 +129,10 @@ class Rank(IntEnum):
     LANDING = 4
     REFERENCE = 5
     HEALTH = 6  # of an autopilot and its filter
-    HEADING_OPEN = 7  # undecided, too little taxi, or partly from taxi after the flight
-    GROUND_RUNS = 8
-    MAGNETIC_OPEN = 9
-    GNSS = 10  # reception
+    GROUND_RUNS = 7
+    GNSS = 8  # reception
+    HEADING_OPEN = 9  # undecided, too little taxi, or partly from taxi after the flight
+    MAGNETIC_OPEN = 10
     INERTIAL_OPEN = 11  # aided by GNSS, or not known whether
     LATENCY = 12
     LANDING_OPEN = 13  # flown, but no gate height passed
