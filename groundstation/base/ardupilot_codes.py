@@ -1,4 +1,4 @@
-"""Codes that ArduPilot logs as numbers: events, errors, flight modes and the reasons of their changes.
+"""Names of what ArduPilot logs as numbers: events, errors, modes, reasons of a mode.
 
 Source: ArduPilot, AP_Logger/AP_Logger.h (LogEvent, LogErrorSubsystem, LogErrorCode), AP_Vehicle/ModeReason.h, mode.h
 of each vehicle, 4.7.0-dev of 2025-10-24. Numbers were added and never reused since 2.x.
@@ -210,7 +210,7 @@ MODE_REASONS: Mapping[int, str] = MappingProxyType(
         51: "take-off failsafe",
         52: "DDS",
         53: "switch",
-        54: "landing",
+        54: "landing by itself",
         55: "fence on again",
     }
 )

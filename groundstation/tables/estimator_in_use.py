@@ -64,7 +64,7 @@ def estimator_in_use(flight: Flight) -> EstimatorInUse | None:
 
 
 def filter_of_topic(topic: str) -> str:
-    """Return the name of the filter that writes a raw topic of DataFlash; empty for another topic.
+    """Return the filter that writes a raw topic of DataFlash; empty for another topic.
 
     Examples
     --------

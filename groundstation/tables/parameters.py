@@ -1,4 +1,4 @@
-"""Parameters of an autopilot, as its own log tells them: values, defaults, changes while it was recorded.
+"""Parameters of an autopilot by its own log: values, defaults, changes.
 
 A ULog has them as messages P and Q, a DataFlash log as PARM (with ``Default`` from ArduPilot 4.3 on), a telemetry log
 as PARAM_VALUE, which tells no defaults.

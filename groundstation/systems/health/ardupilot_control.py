@@ -1,4 +1,4 @@
-"""Evidence of an ArduPilot's power, links and control: battery, radio, tracking, outputs at their end.
+"""Evidence of an ArduPilot's power, links and control.
 
 Source: ArduPilot, AP_Logger/LogStructure.h of all versions from 2013 to 4.7.0-dev of 2025-10-24 (CURR: hundredths of
 volt and ampere in integers until 3.3, Vcc in millivolts); SERVOn_FUNCTION of AP SRV_Channel.h; wiki, telemetry radios:
@@ -40,7 +40,7 @@ DEFAULT_CAPACITY_MAH = 3300.0
 
 
 def battery(flight: Flight) -> Iterator[Evidence]:
-    """Yield the state by the autopilot's own limits of voltage, the charge left, and the supply of the board."""
+    """Yield the battery's state by the log's own limits, its charge, the board's supply."""
     parameters = parameters_of(flight)
     for table, instance in instances(flight, "BAT", "BAT2") or instances(flight, "CURR", "CUR2"):
         field = named(table, "Volt")
@@ -70,7 +70,7 @@ def _prefix(instance: int) -> str:
 def voltage(
     source: str, time_ns: Int64Array, volt: FloatArray, instance: int, parameters: Parameters
 ) -> Iterator[Evidence]:
-    """Yield 1 where the voltage is below the low limit for ten seconds, 2 below the critical one.
+    """Yield 1 where the voltage stays below the low limit, 2 below the critical one.
 
     Without a limit in the log nothing is said: the number of cells is not known. A battery that is below its limit all
     the time, at a few volts, is none: the aircraft was on another supply.
@@ -90,7 +90,7 @@ def voltage(
 
 
 def link(flight: Flight) -> Iterator[Evidence]:
-    """Yield strength and failsafe of the remote control, fade margin of the radio, and packets lost."""
+    """Yield signal and failsafe of the remote control, margin of the radio, packets lost."""
     for table, _ in instances(flight, "RSSI"):
         if is_number(table, "RXRSSI") and np.any(table.values("RXRSSI") > 0.0):
             value = table.values("RXRSSI")
@@ -146,7 +146,7 @@ def tracking(flight: Flight) -> Iterator[Evidence]:
 
 
 def _is_held(flight: Flight, time_ns: Int64Array) -> BoolArray:
-    """Tell when a mode with a setpoint of attitude was flown; always, where no modes are logged."""
+    """Tell when a mode with a setpoint of attitude was flown; always without modes."""
     if "raw.MODE" not in flight:
         return np.ones(len(time_ns), dtype=bool)
     table = flight["raw.MODE"]

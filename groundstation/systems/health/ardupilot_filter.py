@@ -1,4 +1,4 @@
-"""Evidence of ArduPilot's Kalman filters: test ratios, faults, biases, resets, lanes, and DCM beside them.
+"""Evidence of ArduPilot's Kalman filters, and of DCM beside them.
 
 SV, SP, SH, SM and SVT are square roots of innovation test ratios in every firmware that logs them (EKF1 of 2014, EKF2,
 EKF3): above 1 the filter rejects. They are hundredths in 16 bits: a negative one has run over, and is 655.36 more.
@@ -109,7 +109,10 @@ def _switches(flight: Flight, name: str, lanes: tuple[Logged, ...]) -> Iterator[
 
 
 def _not_the_one_set(flight: Flight, used: EstimatorInUse | None) -> Iterator[Evidence]:
-    """Yield when another estimator flew than the one that is set, as DCM does while the filter is not ready."""
+    """Yield when another estimator flew than the one that is set.
+
+    DCM does while the filter is not ready.
+    """
     wanted = _wanted(flight)
     if used is None or "AEKF" not in used.source or not wanted:
         return
@@ -166,7 +169,10 @@ def _states(lanes: tuple[Logged, ...], used: EstimatorInUse | None, name: str) -
 def _of_primary(
     lanes: tuple[Logged, ...], values: list[FloatArray | None], used: EstimatorInUse | None, name: str
 ) -> tuple[Series, str]:
-    """Return the values of the lane in use along time, NaN where the filter itself was not in use, and their topic."""
+    """Return the values of the lane in use along time, and their topic.
+
+    They are NaN where the filter itself was not in use.
+    """
     times, kept, topics = [], [], []
     for (table, lane), value in zip(lanes, values, strict=True):
         if value is None:
@@ -188,14 +194,14 @@ def _of_primary(
 
 
 def _is_primary(table: Table, lane: int) -> BoolArray:
-    """Tell where a lane says of itself that it is the one in use; the first where no lane says it."""
+    """Tell where a lane says that it is the one in use; the first where none says it."""
     if is_number(table, "PI"):
         return np.asarray(table.values("PI") == lane)
     return np.full(len(table), lane == 0)
 
 
 def primary_lane(flight: Flight, name: str) -> Series:
-    """Return the lane in use along time, by the first lane's own records; empty where it is not logged."""
+    """Return the lane in use along time, as the first lane tells it; empty without one."""
     for table, _ in instances(flight, *FILTERS[name][0])[:1]:
         if is_number(table, "PI"):
             lane = table.values("PI")
@@ -307,7 +313,10 @@ def _reset_rows(table: Table) -> NDArray[np.intp]:
 
 
 def _steps(flight: Flight, name: str, types: tuple[str, ...], lane_of: Series, told_ns: Int64Array) -> Iterator[Event]:
-    """Yield steps of the position that its own velocity does not explain, where no reset is told within a second."""
+    """Yield steps of the position that its own velocity does not explain.
+
+    One within a second of a reset that is told is that reset.
+    """
     for table, lane in instances(flight, *types):
         if not is_number(table, "PN", "PE", "VN", "VE") or len(table) < 3:
             continue

@@ -1,4 +1,4 @@
-"""Evidence of an ArduPilot's sensors: receivers, vibration, magnetometers, inertial units, and of its timing.
+"""Evidence of an ArduPilot's sensors, and of its timing.
 
 Source: ArduPilot, AP_Logger/LogStructure.h of all versions from 2013 to 4.7.0-dev of 2025-10-24; u-blox 8 / M8 receiver
 description, UBX-MON-HW (jamInd 0 to 255).
@@ -122,7 +122,7 @@ def vibration(flight: Flight) -> Iterator[Evidence]:
 
 
 def magnetometers(flight: Flight) -> Iterator[Evidence]:
-    """Yield length and change of the field, offsets, and the share of the field that the throttle makes."""
+    """Yield length and change of the field, offsets, and what the throttle adds to it."""
     power, name, full = throttle(flight)
     parameters = parameters_of(flight)
     for number, topic in enumerate(topics_of_kind("magnetometer", flight.topics()), start=1):
@@ -152,18 +152,21 @@ def magnetometers(flight: Flight) -> Iterator[Evidence]:
 
 
 def is_off(parameters: Parameters, name: str, instance: int) -> bool:
-    """Tell whether a sensor is switched off in the parameters: what it shows is nobody's concern."""
+    """Tell whether a sensor is switched off in the parameters: it concerns nobody."""
     return parameters.value(name + ("" if instance == 0 else f"{instance + 1}")) == 0.0
 
 
 def _milligauss(table: Table) -> float:
-    """Return the factor to milligauss: 1000 where a log has gauss, as no compass measures a field below 2 mG."""
+    """Return the factor to milligauss: 1000 where a log has gauss.
+
+    No compass measures a field below 2 mG.
+    """
     field = np.abs(table.values("MagX")) if is_number(table, "MagX") else np.zeros(1)
     return 1.0 if is_integer(table, "OfsX") or np.nanmax(field, initial=0.0) > 2.0 else 1000.0
 
 
 def throttle(flight: Flight) -> tuple[Series, str, float]:
-    """Return throttle or current along time, the name of the field, and the range that counts as full.
+    """Return throttle or current along time, its field, and the value that counts as full.
 
     Copters logged throttle in thousandths (to 3.2), then as a share; planes in per cent. A current has no full scale:
     its own range counts.
@@ -190,7 +193,9 @@ def throttle(flight: Flight) -> tuple[Series, str, float]:
 
 
 def _by_throttle(field: Series, power: Series, full: float, usual: float) -> FloatArray | None:
-    """Return what throttle adds to the field by a straight line, as a share of the field at idle, along time.
+    """Return what throttle adds to the field, as a share of the field at idle, along time.
+
+    It is the slope of a straight line.
 
     None where the throttle hardly moved, or where the line explains less than a tenth of the variance: then nothing is
     said, neither good nor bad, of a field that something else changed.
@@ -258,7 +263,7 @@ def _apart(
 
 
 def timing(flight: Flight) -> Iterator[Evidence]:
-    """Yield slow loops, load of the processor, errors of buses, and records that were not written."""
+    """Yield slow loops, load of the processor, errors of buses, and records dropped."""
     for table, _ in instances(flight, "PM"):
         loops = named(table, "NLoop", "NL")
         if loops and is_number(table, "NLon"):

@@ -1,4 +1,4 @@
-"""Access to raw messages whose names, fields and numbering changed between versions of an autopilot."""
+"""Raw messages whose names, fields and numbering changed between versions."""
 
 import re
 from collections.abc import Iterator
@@ -48,7 +48,7 @@ def instances(flight: Flight, *names: str) -> tuple[Logged, ...]:
 
 
 def _apart(table: Table, otherwise: int) -> Iterator[tuple[int, Table]]:
-    """Yield the instances that are mixed in a table; the table itself where its topic is of one."""
+    """Yield the instances that are mixed in a table; the table itself where it is of one."""
     field = next((name for name in INSTANCE_FIELDS if is_number(table, name)), None)
     if field is None:
         yield otherwise, table
@@ -113,7 +113,10 @@ def latest(series: Series, time_ns: Int64Array) -> FloatArray:
 
 
 def nearest(time_ns: Int64Array, other_ns: Int64Array, largest_gap_s: float) -> tuple[NDArray[np.intp], BoolArray]:
-    """Return the place of the nearest other sample, the earlier one of two as near, and whether it is near enough."""
+    """Return the place of the nearest other sample, and whether it is near enough.
+
+    Of two as near it is the earlier one.
+    """
     if not len(other_ns):
         return np.zeros(len(time_ns), dtype=np.intp), np.zeros(len(time_ns), dtype=bool)
     after = np.clip(np.searchsorted(other_ns, time_ns, side="left"), 0, len(other_ns) - 1)
@@ -145,7 +148,7 @@ def counted(series: Series) -> FloatArray:
 
 
 def low_pass(time_s: FloatArray, value: FloatArray, constant_s: float, longest_step_s: float) -> FloatArray:
-    """Filter columns by y += (x - y) dt / constant, from 0, as a loop over the samples does; shape as ``value``.
+    """Filter columns by y += (x - y) dt / constant, from 0; shape as ``value``.
 
     A missing value leaves the filter where it is. Steps of time are cut at ``longest_step_s``. Blocks are short enough
     for the product of the factors not to underflow.
@@ -163,7 +166,7 @@ def low_pass(time_s: FloatArray, value: FloatArray, constant_s: float, longest_s
 
 
 def mean_over(time_s: FloatArray, value: FloatArray, window_s: float) -> FloatArray:
-    """Return the mean of the window before each sample, shape as ``value``; NaN until the window is full."""
+    """Return the mean of the window before each sample; NaN until the window is full."""
     total = np.vstack([np.zeros(value.shape[1]), np.cumsum(np.nan_to_num(value), axis=0)])
     known = np.concatenate([[0], np.cumsum(np.isfinite(value).all(axis=1))])
     first = np.searchsorted(time_s, time_s - window_s, side="right")

@@ -106,7 +106,10 @@ def _is_px4(flight: Flight) -> bool:
 
 
 def _filter(flight: Flight) -> Iterator[Evidence]:
-    """Yield innovations of the filter: a ratio that is zero throughout is of a sensor that was never fused."""
+    """Yield innovations of the filter.
+
+    A ratio that is zero throughout is of a sensor that was never fused.
+    """
     for name, quantity, fields, flags in (
         ("EKF_STATUS_REPORT", "test_ratio_root", _ROOTS, _EKF_FLAGS),
         ("ESTIMATOR_STATUS", "test_ratio", _RATIOS, _ESTIMATOR_FLAGS),
@@ -214,7 +217,10 @@ def _battery(flight: Flight) -> Iterator[Evidence]:
 
 
 def _radio(flight: Flight) -> Iterator[Evidence]:
-    """Yield the fade margin of the radio, which tells it under a number of its own, and the remote control's signal."""
+    """Yield the fade margin of the radio, and the remote control's signal.
+
+    The radio tells it under a number of its own.
+    """
     pattern = re.compile(r"raw\.RADIO(?:_STATUS)?(?:\.\d+_\d+)?")
     for topic in flight.topics():
         if not pattern.fullmatch(topic):

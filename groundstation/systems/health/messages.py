@@ -1,4 +1,4 @@
-"""What an autopilot said: logged text by its own level, error codes by name, changes of mode with their reason.
+"""Messages of an autopilot: logged text, error codes, events, changes of mode.
 
 A text that has no level (MSG of DataFlash) is graded by known words. A failsafe is never information, unless the text
 or the code says that it is over.
@@ -49,7 +49,7 @@ class Message(NamedTuple):
 
 
 def messages(flight: Flight) -> tuple[Message, ...]:
-    """Return logged text in order of time, graded by its level, or by its words where it has none."""
+    """Return logged text in order of time, graded by its level, or else by its words."""
     return flight.once("logged messages", lambda one: tuple(sorted(_read(one))))
 
 
@@ -79,7 +79,7 @@ def _levels(table: Table, field: str) -> list[int | str | None]:
 
 
 def events(flight: Flight) -> Iterator[Event]:
-    """Yield text, error codes, events and changes of mode as events of the checks they concern."""
+    """Yield text, codes and changes of mode as events of the checks they concern."""
     yield from texts(flight)
     yield from _errors(flight)
     yield from _plain_events(flight)
@@ -166,7 +166,9 @@ def _mode_names(flight: Flight) -> dict[int, str]:
 
 
 def findings(flight: Flight) -> tuple[Finding, ...]:
-    """Return a finding for each kind of warning or failure that was said, with how often and when first.
+    """Return a finding for each kind of warning or failure that was said.
+
+    It has how often, and when first.
 
     Texts that differ in numbers alone are one kind. Beyond ``MOST_TOLD`` kinds the rest is counted.
     """

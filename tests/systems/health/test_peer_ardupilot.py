@@ -1,4 +1,4 @@
-"""ArduPilot's own analysis on the same logs: every figure that both have over the whole log."""
+"""Figures of ArduPilot's own analysis on the same logs, over the whole log, as the peer takes them."""
 
 import tomllib
 from collections.abc import Callable, Mapping
