@@ -297,7 +297,8 @@ def names_of(name: str, results: FlightResults) -> list[tuple[str, ...]]:
         known = (
             one
             for one in results.figure_names
-            if (found := results.figure_with_rows(one)) is not None
+            if not one.startswith("gnss_")  # whose chapter draws them
+            and (found := results.figure_with_rows(one)) is not None
             and "time_s" in found.columns
             and columns_by_unit(found)
         )
