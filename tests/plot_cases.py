@@ -24,6 +24,7 @@ from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, Source
 from groundstation.simulation.session import simulate_session
 from groundstation.systems.cooperative.analysis import COOPERATIVE
+from groundstation.systems.gnss.answer import GnssReception
 from groundstation.systems.known import SessionKnown
 from groundstation.systems.landing.answer import LandingResult
 from groundstation.systems.landing.arrays import LandingPath, LandingProtection
@@ -296,7 +297,8 @@ def names_of(name: str, results: FlightResults) -> list[tuple[str, ...]]:
         known = (
             one
             for one in results.figure_names
-            if (found := results.figure_with_rows(one)) is not None
+            if not one.startswith("gnss_")  # whose chapter draws them
+            and (found := results.figure_with_rows(one)) is not None
             and "time_s" in found.columns
             and columns_by_unit(found)
         )
@@ -313,4 +315,9 @@ def names_of(name: str, results: FlightResults) -> list[tuple[str, ...]]:
     if name == "together.motion":
         joined = results.answer(Together)
         return [(one.label,) for one in joined.agreement] if joined else [("b",)]
+    if name in ("gnss.quality", "gnss.standstill", "gnss.steps", "gnss.pair"):
+        reception = results.answer(GnssReception)
+        if name == "gnss.pair":
+            return [(f"{one.second} from {one.first}",) for one in reception.pairs] if reception else [("b from a",)]
+        return [(one.topic,) for one in reception.receivers] if reception else [("gnss",)]
     return [()]

@@ -95,7 +95,7 @@ class StandstillScatter:
     claimed_m, up_claimed_m : float or None
         Median sigmas that the receiver claims.
     correlation_s : float or None
-        Time after which errors have forgotten themselves to 1/e; None: longer than a quarter of the standstill, so that
+        Time after which errors are correlated by less than 1/e; None: longer than a tenth of the standstill, so that
         the scatter understates the error.
     independent : float
         Values that are independent of each other; 1 where the correlation is not known.
@@ -125,7 +125,7 @@ class StandstillScatter:
     @property
     def is_coarse(self) -> bool:
         """Tell whether the step in which positions are logged hides their scatter."""
-        return self.resolution_m > COARSE * self.scatter_m
+        return not self.is_held and self.resolution_m > COARSE * self.scatter_m
 
 
 @dataclass(frozen=True)

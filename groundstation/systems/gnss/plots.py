@@ -143,7 +143,7 @@ def standstill(results: FlightResults, topic: str) -> Plot | None:
         return None
     mine = data.where(data.topic == topic)
     stood = next((one.standstill for one in answer.receivers if one.topic == topic), None)
-    if not len(mine) or stood is None:
+    if not len(mine) or stood is None or stood.is_held:
         return None
     scale, unit = (1.0 / M_PER_CM, "cm") if stood.scatter_m < 0.5 else (1.0, "m")
     reach = symmetric(scale * finite(mine.north_m, mine.east_m), 0.1)

@@ -18,6 +18,8 @@ IN_MOTION = ("take-off run", "airborne", "landing roll")
 CREEP = 0.2  # of the speed that stands: the mean over the whole of it may be no more
 MOVED_SIGMAS, LEAST_MOVED_M = 4.0, 0.02  # a place that moves by more than its claimed sigma allows does not stand
 LEAST_AVERAGES = 4  # means of one length that make a scatter
+BELIEVED = 10  # a longer correlation than this part of the standstill is not known
+FINE_M = 0.005  # a finer step of logged places would show errors: repeated places are held
 HELD_SHARE = 0.9  # share of rows at the place of the row before: the receiver repeats it
 
 
@@ -91,7 +93,7 @@ def _window_mean(time_s: FloatArray, values: FloatArray, from_s: float, to_s: fl
     is_known = np.isfinite(values)
     first = np.searchsorted(time_s, time_s + from_s - 1e-9, side="left")
     behind = np.searchsorted(time_s, time_s + to_s + 1e-9, side="right")
-    middle = np.nanmean(values, axis=0) if is_known.any() else np.zeros(values.shape[1])
+    middle = np.where(is_known, values, 0.0).sum(axis=0) / np.maximum(is_known.sum(axis=0), 1)
     total = np.vstack([np.zeros(values.shape[1]), np.cumsum(np.where(is_known, values - middle, 0.0), axis=0)])
     count = np.vstack([np.zeros(values.shape[1]), np.cumsum(is_known, axis=0)])
     number = count[behind] - count[first]
@@ -101,9 +103,8 @@ def _window_mean(time_s: FloatArray, values: FloatArray, from_s: float, to_s: fl
 def _creeps(one: ReceiverRows, rows: NDArray[np.intp], settings: GnssSettings) -> bool:
     """Tell whether the mean velocity of a whole standstill is that of a slow motion."""
     velocity = one.velocity_mps[rows, :2]
-    if not np.isfinite(velocity).any():
-        return False
-    return float(np.hypot(*np.nanmean(velocity, axis=0))) > CREEP * settings.still_mps
+    velocity = velocity[np.isfinite(velocity).all(axis=1)]
+    return bool(len(velocity)) and float(np.hypot(*velocity.mean(axis=0))) > CREEP * settings.still_mps
 
 
 def _judged(one: ReceiverRows, rows: NDArray[np.intp]) -> Stood:
@@ -114,8 +115,9 @@ def _judged(one: ReceiverRows, rows: NDArray[np.intp]) -> Stood:
     step_s = float(np.median(np.diff(one.time_s[rows])))
     length_s = float(one.time_s[rows[-1]] - one.time_s[rows[0]])
     resolution_m = one.resolution_m
-    is_coarse = resolution_m > COARSE * _spread(offset[:, :2])
-    is_held = not is_coarse and bool(np.mean(np.all(np.diff(offset[:, :2], axis=0) == 0.0, axis=1)) > HELD_SHARE)
+    repeats = bool(np.mean(np.all(np.diff(offset[:, :2], axis=0) == 0.0, axis=1)) > HELD_SHARE)
+    is_held = repeats and resolution_m < FINE_M
+    is_coarse = not is_held and resolution_m > COARSE * _spread(offset[:, :2])
     correlation_s = None if is_held or is_coarse else correlation_time_s(offset[:, :2], step_s)
     independent = 1.0
     if correlation_s is not None:
@@ -156,7 +158,7 @@ def _spread(offset_m: FloatArray) -> float:
 def correlation_time_s(offset_m: FloatArray, step_s: float) -> float | None:
     """Return the time after which errors are correlated by less than 1/e.
 
-    None where that is longer than a quarter of the samples.
+    None where that is longer than a tenth of the samples: a mean taken away makes errors that last look shorter.
 
     Examples
     --------
@@ -169,7 +171,7 @@ def correlation_time_s(offset_m: FloatArray, step_s: float) -> float | None:
     count = len(offset_m)
     size = 1 << (2 * count - 1).bit_length()
     spectrum = np.fft.rfft(offset_m - offset_m.mean(axis=0), size, axis=0)
-    together = np.fft.irfft((np.abs(spectrum) ** 2).sum(axis=1), size)[: count // 4 + 1]
+    together = np.fft.irfft((np.abs(spectrum) ** 2).sum(axis=1), size)[: count // BELIEVED + 1]
     if len(together) < 2 or not together[0] > 0.0:
         return None
     below = np.flatnonzero(together / together[0] < np.exp(-1.0))

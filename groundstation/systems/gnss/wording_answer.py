@@ -86,7 +86,7 @@ def memory_of(stood: StandstillScatter) -> str:
         return f"{step}: finer scatter is not seen"
     if stood.correlation_s is None:
         return (
-            f"it stood for {seconds_text(length_s)} and errors last longer than {seconds_text(length_s / 4.0)}: "
+            f"it stood for {seconds_text(length_s)} and errors last longer than {seconds_text(length_s / 10.0)}: "
             "the scatter understates the error"
         )
     return (

@@ -1,0 +1,308 @@
+"""Reception of a receiver with known truth: shares of time, losses, scatter, jumps, delays, two receivers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from groundstation.base.errors import NotAssessableError
+from groundstation.base.records import Column
+from groundstation.systems.gnss.examine import shortfalls_of
+from groundstation.systems.gnss.settings import GnssSettings
+from groundstation.tables.phases import Interval, Phases
+from groundstation.tables.table import Flight
+from tests.gnss.receiver_flight import (
+    STANDS_S,
+    STEP_S,
+    WHOLE_S,
+    answer,
+    flight,
+    motion,
+    receiver,
+    reception,
+    shares,
+    table,
+    times,
+    unknown_phases,
+)
+
+EXACT_M = 2e-4  # radii of curvature differ by so much across the circle
+CODES = "gnss."
+
+
+def codes(*tables: object, **settings: float) -> dict[str, str]:
+    return {one.code.removeprefix(CODES): one.severity for one in reception(*tables, **settings).findings}  # type: ignore[arg-type]
+
+
+def test_shares_are_of_time_and_not_of_rows() -> None:
+    time_s = np.concatenate([np.arange(0.0, 60.0, 0.1), np.arange(60.0, 180.0, 0.4)])  # twice as many rows at first
+    kinds = np.where(time_s < 60.0, "rtk_fixed", "rtk_float")
+    one = receiver(table(time_s, fix=kinds))
+    assert shares(one)["rtk_fixed"] == pytest.approx(1.0 / 3.0, abs=0.005)
+    assert [state.state for state in one.states] == ["rtk_fixed", "rtk_float"]
+    assert answer(table(time_s, fix=kinds)).sentence.startswith("RTK float 67 %, RTK fixed 33 %, nothing lost; 12 sat")
+
+
+def test_never_a_fix_is_the_sentence_and_bad() -> None:
+    count = 926
+    nothing = np.full(count, np.nan)
+    places = dict.fromkeys(("latitude_deg", "longitude_deg", "altitude_ellipsoid_m"), nothing)
+    velocities = {f"velocity_{axis}_mps": nothing for axis in ("north", "east", "down")}
+    none = {"fix": np.full(count, "none"), "satellites_used": np.zeros(count), "hdop": nothing}
+    found = reception(table(np.arange(count) * 0.1, **places, **velocities, **none))
+    assert found.answer.sentence == "GNSS never had a fix: 926 rows, 0 satellites"
+    assert found.answer.grade == "bad" and found.findings[0].code == "gnss.never_a_fix"
+    assert found.answer.receiver.first_fix_s is None
+
+
+def test_a_fix_at_latitude_zero_is_none() -> None:
+    """Readers leave the place out; the kind of fix stays as claimed."""
+    time_s = times()
+    no_place = time_s < 30.0
+    gone = {
+        name: np.where(no_place, np.nan, table(time_s).values(name))
+        for name in ("latitude_deg", "longitude_deg", "velocity_north_mps", "velocity_east_mps")
+    }
+    one = receiver(table(time_s, **gone))
+    assert one.placeless_rows == 150 and one.first_fix_s == pytest.approx(30.0)
+    assert shares(one)["none"] == pytest.approx(30.0 / WHOLE_S, abs=0.005)
+    assert codes(table(time_s, **gone))["no_place"] == "warn"
+    assert answer(table(time_s, **gone)).sentence.startswith(
+        "first fix after 30 s, then single (3D) throughout, nothing"
+    )
+
+
+def test_a_loss_has_length_speeds_and_way() -> None:
+    time_s = times()
+    lost = (time_s >= 100.0) & (time_s < 112.0)
+    one = receiver(table(time_s, fix=np.where(lost, "none", "3d")))
+    (loss,) = one.losses
+    assert (loss.state, loss.start_s, loss.seconds) == ("none", pytest.approx(100.0), pytest.approx(12.0))
+    assert loss.speed_before_mps == pytest.approx(10.0) and loss.speed_after_mps == pytest.approx(10.0)
+    place, _velocity = motion(np.array([99.8, 112.0]))
+    assert loss.moved_m == pytest.approx(float(np.hypot(*(place[1] - place[0]))), rel=1e-4)
+    assert one.lost_s == pytest.approx(12.0) and answer(table(time_s, fix=np.where(lost, "none", "3d"))).grade == "warn"
+
+
+def test_a_gap_of_the_log_is_not_the_receivers() -> None:
+    time_s = times()
+    kept = (time_s < 100.0) | (time_s >= 130.0)
+    alone = receiver(table(time_s[kept]))
+    assert shares(alone)["no_record"] == pytest.approx(30.0 / WHOLE_S, abs=0.005)
+    assert answer(table(time_s[kept])).sentence.startswith("single (3D) throughout, nothing recorded for 30 s")
+    baro = replace(table(time_s[kept], pressure_altitude_m=np.zeros(kept.sum())), topic="baro")
+    with_baro = receiver(table(time_s[kept]), baro)
+    assert "log_silent" in shares(with_baro) and "no_record" not in shares(with_baro)
+    all_along = replace(table(time_s, pressure_altitude_m=np.zeros(len(time_s))), topic="baro")
+    assert "no_record" in shares(receiver(table(time_s[kept]), all_along))
+    assert codes(table(time_s[kept]), all_along)["silent"] == "warn"
+    assert "silent" not in codes(table(time_s[kept]), baro)
+
+
+def test_repeated_rows_are_one() -> None:
+    time_s = np.repeat(np.arange(0.0, 60.0), 2)
+    pairs = table(time_s, hdop=np.where(np.arange(120) % 2 == 0, 0.8, np.nan))
+    one = receiver(pairs)
+    assert (one.rows, one.repeated_rows, one.missed_epochs) == (120, 60, 0)
+    assert one.rate_hz == pytest.approx(1.0) and one.hdop == pytest.approx(0.8)
+
+
+def test_missing_epochs_are_counted() -> None:
+    time_s = np.delete(times(), [100, 200, 201])
+    assert receiver(table(time_s)).missed_epochs == 3
+
+
+def test_zero_satellites_beside_a_fix_are_not_logged() -> None:
+    time_s = times()
+    one = receiver(table(time_s, satellites_used=np.zeros(len(time_s))))
+    assert one.satellites_used is None and "satellites" not in answer(table(time_s, satellites_used=None)).sentence
+    assert "satellites_used_beyond" not in codes(table(time_s, satellites_used=np.zeros(len(time_s))))
+
+
+def test_few_satellites_and_bad_geometry_are_graded_by_time() -> None:
+    time_s = times()
+    some = np.where(time_s < 20.0, 5.0, 12.0)
+    assert codes(table(time_s, satellites_used=some))["satellites_used_beyond"] == "warn"
+    assert answer(table(time_s, satellites_used=some)).grade == "warn"
+    assert answer(table(time_s, satellites_used=np.full(len(time_s), 4.0))).grade == "bad"
+    assert codes(table(time_s, hdop=np.where(time_s < 5.0, 4.0, 0.8))).keys() == {"held"}, "3 % of the time"
+    assert codes(table(time_s, hdop=np.where(time_s < 20.0, 4.0, 0.8)))["hdop_beyond"] == "warn"
+
+
+def test_what_is_not_logged_is_never_good() -> None:
+    time_s = times()
+    bare = table(time_s, fix=None, satellites_used=None, hdop=None)
+    assert answer(bare).grade == "unknown"
+    assert answer(table(time_s, fix=None, hdop=None)).grade == "good", "satellites tell"
+    told = [one.text for one in shortfalls_of(flight(bare), unknown_phases(), GnssSettings())]
+    assert told[0] == "not logged: kind of fix, satellites, DOP, claimed accuracy"
+
+
+def test_integrity_that_is_lost_is_no_fix() -> None:
+    time_s = times()
+    sound = Column((time_s < 100.0) | (time_s > 140.0))
+    one = receiver(table(time_s, integrity_ok=sound))
+    assert shares(one)["integrity_lost"] == pytest.approx(40.0 / WHOLE_S, abs=0.005)
+    flat = receiver(table(time_s, fix=np.full(len(time_s), "2d"), integrity_ok=Column(np.zeros(len(time_s), bool))))
+    assert shares(flat) == {"2d": 1.0}, "nobody vouches for a 2D fix"
+    assert codes(table(time_s, fix=np.full(len(time_s), "2d")))["two_dimensions"] == "warn"
+
+
+def noisy(sigma_m: float, seed: int = 1) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    place, _velocity = motion(times())
+    return np.asarray(place + rng.normal(0.0, sigma_m / np.sqrt(2.0), place.shape))
+
+
+def test_scatter_of_white_errors_is_the_sigma_and_has_no_memory() -> None:
+    claimed = np.full(len(times()), 0.02)
+    stood = receiver(table(times(), place_m=noisy(0.02), horizontal_sigma_m=claimed)).standstill
+    assert stood is not None
+    count = 2 * (stood.samples - 1)
+    assert abs(stood.scatter_m / 0.02 - 1.0) < 4.0 / np.sqrt(2.0 * count)
+    assert stood.claimed_m == 0.02 and stood.correlation_s == pytest.approx(STEP_S)
+    assert STANDS_S - 10.0 < stood.end_s - stood.start_s < STANDS_S, "the drive is no standstill"
+    assert not stood.is_held and not stood.is_coarse
+    sentence = answer(table(times(), place_m=noisy(0.02), horizontal_sigma_m=claimed)).sentence
+    assert f"scatter {100.0 * stood.scatter_m:.1f} cm where 2.0 cm is claimed" in sentence
+
+
+def test_claims_that_are_too_small_are_a_warning() -> None:
+    claimed = np.full(len(times()), 0.005)
+    assert codes(table(times(), place_m=noisy(0.02), horizontal_sigma_m=claimed))["too_sure"] == "warn"
+    assert "too_sure" not in codes(table(times(), place_m=noisy(0.02), horizontal_sigma_m=8.0 * claimed))
+
+
+def test_errors_that_last_are_told() -> None:
+    rng, time_s = np.random.default_rng(3), times()
+    walk = np.cumsum(rng.normal(0.0, 0.01, (len(time_s), 2)), axis=0)
+    stood = receiver(table(time_s, place_m=motion(time_s)[0] + walk)).standstill
+    assert stood is not None and stood.correlation_s is None and stood.independent == 1.0
+    steady = np.zeros((len(time_s), 2))
+    held = receiver(table(time_s, place_m=motion(time_s)[0] + steady)).standstill
+    assert held is not None and held.is_held
+    assert codes(table(time_s))["held"] == "info"
+
+
+def test_the_step_of_logged_places_hides_scatter() -> None:
+    step_deg = 1e-7
+    exact = table(times(), place_m=noisy(0.001))
+    rounded = {name: np.round(exact.values(name) / step_deg) * step_deg for name in ("latitude_deg", "longitude_deg")}
+    stood = receiver(table(times(), **rounded)).standstill
+    assert stood is not None and stood.resolution_m == pytest.approx(0.0111, abs=2e-4)
+    assert stood.is_coarse or stood.scatter_m > 0.5 * stood.resolution_m
+
+
+def test_in_the_air_nothing_stands() -> None:
+    phases = Phases((Interval(0.0, WHOLE_S, "airborne"),), "test")
+    assert reception(table(times(), place_m=noisy(0.02)), phases=phases).answer.receiver.standstill is None
+
+
+def test_without_noise_position_and_velocity_agree() -> None:
+    one = receiver(table(times()))
+    assert one.jumps_found == 0 and one.motion is not None
+    assert one.motion.difference_rms_mps < 0.02, "of the trapezoid in a circle"
+    assert one.motion.lag_s == pytest.approx(0.0, abs=0.005)
+
+
+@pytest.mark.parametrize("lag_s", [0.25, -0.15])
+def test_a_late_velocity_is_found_with_its_sign(lag_s: float) -> None:
+    time_s = times()
+    _place, velocity = motion(time_s - lag_s)
+    one = receiver(table(time_s, velocity_north_mps=velocity[:, 0], velocity_east_mps=velocity[:, 1]))
+    assert one.motion is not None and one.motion.lag_s == pytest.approx(lag_s, abs=0.005)
+    assert one.motion.left_rms_mps < 0.1 * one.motion.difference_rms_mps
+
+
+def test_a_jump_is_found_with_place_and_size() -> None:
+    time_s = times()
+    place, velocity = motion(time_s)
+    ahead = velocity[time_s >= 120.0][0] / 10.0
+    place[time_s >= 120.0] += 3.0 * ahead + 4.0 * np.array([-ahead[1], ahead[0]])
+    one = receiver(table(time_s, place_m=place))
+    (jump,) = one.jumps
+    assert jump.along_m == pytest.approx(3.0, abs=0.1)
+    assert (jump.time_s, jump.size_m) == (pytest.approx(120.0), pytest.approx(5.0, abs=0.05))
+    assert jump.time_shift_s is None and codes(table(time_s, place_m=place))["jump"] == "warn"
+
+
+def test_a_wrong_time_stamp_is_told_from_a_wrong_place() -> None:
+    time_s = times()
+    shifted = np.where(time_s >= 120.0, time_s + 1.0, time_s)
+    one = receiver(table(time_s, place_m=motion(shifted)[0]))
+    (jump,) = one.jumps
+    assert jump.size_m == pytest.approx(10.0, abs=0.1) and jump.time_shift_s == pytest.approx(1.0, abs=0.02)
+
+
+def test_jumps_without_velocities() -> None:
+    time_s = times()
+    place = motion(time_s)[0]
+    place[time_s >= 120.0] += (3.0, -4.0)
+    nothing = {f"velocity_{axis}_mps": None for axis in ("north", "east", "down")}
+    one = receiver(table(time_s, place_m=place, **nothing))
+    assert one.motion is None and one.jumps_found == 1 and one.jumps[0].time_s == pytest.approx(120.0)
+
+
+def test_far_from_the_first_place_steps_are_still_right() -> None:
+    """A plane 3 deg away has no jumps and no difference of its own."""
+    time_s = times(whole_s=3000.0)
+    speed = np.full(len(time_s), 100.0)
+    far_m = np.column_stack([np.zeros(len(time_s)), 100.0 * time_s])
+    one = receiver(
+        table(time_s, place_m=far_m, velocity_north_mps=0.0 * speed, velocity_east_mps=speed, altitude_ellipsoid_m=None)
+    )
+    assert one.jumps_found == 0 and one.motion is not None and one.motion.difference_rms_mps < 1e-3
+
+
+def test_two_antennas_keep_their_distance_and_the_late_one_is_found() -> None:
+    time_s = times()
+    late_s = 0.1
+    _place, velocity = motion(time_s)
+    speed = np.hypot(velocity[:, 0], velocity[:, 1])
+    moving = speed > 0.0
+    track = np.where(moving[:, None], velocity / np.where(moving, speed, 1.0)[:, None], [[1.0, 0.0]])
+    ahead = motion(time_s - late_s)[0] + 1.5 * track
+    found = answer(table(time_s, "gnss.1"), table(time_s, "gnss.2", ahead))
+    (pair,) = found.pairs
+    assert (pair.first, pair.second, pair.seconds) == ("gnss.1", "gnss.2", pytest.approx(WHOLE_S, abs=1.0))
+    assert pair.lag_s == pytest.approx(late_s, abs=0.01) and pair.forward_m == pytest.approx(1.5, abs=0.05)
+    assert pair.velocity_difference_rms_mps == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_dead_second_receiver_is_a_warning_and_not_the_answer() -> None:
+    time_s = times()
+    nothing = np.full(len(time_s), np.nan)
+    dead = table(
+        time_s,
+        "gnss.1",
+        latitude_deg=nothing,
+        longitude_deg=nothing,
+        altitude_ellipsoid_m=nothing,
+        velocity_north_mps=nothing,
+        velocity_east_mps=nothing,
+        velocity_down_mps=nothing,
+        satellites_used=np.zeros(len(time_s)),
+        hdop=nothing,
+        fix=np.full(len(time_s), "none"),
+    )
+    found = answer(dead, table(time_s, "gnss.2"))
+    assert (found.main, found.grade, found.pairs) == ("gnss.2", "warn", ())
+    assert found.sentence.endswith("gnss.1: never had a fix: 900 rows, 0 satellites")
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_row_or_two_give_a_sentence(count: int) -> None:
+    found = answer(table(np.arange(count) * 1.0))
+    assert found.sentence.startswith("single (3D)") and found.receiver.rows == count
+
+
+def test_without_a_receiver_there_is_a_reason() -> None:
+    with pytest.raises(NotAssessableError, match="no GNSS in the log"):
+        reception()
+    assert isinstance(flight(), Flight)
+
+
+def test_all_nan_and_shuffled_fields_are_no_error() -> None:
+    time_s = times(1.0)
+    for name in ("latitude_deg", "velocity_north_mps", "altitude_ellipsoid_m", "hdop", "satellites_used"):
+        assert answer(table(time_s, **{name: np.full(len(time_s), np.nan)})).sentence
