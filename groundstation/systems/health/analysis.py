@@ -38,6 +38,7 @@ class _Checked(NamedTuple):
 
 
 def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[AutopilotHealth]:
+    from groundstation.systems.health import messages
     from groundstation.systems.health.checks import worst_of
     from groundstation.systems.health.figures import lanes_figure, series_figure
     from groundstation.systems.health.sentence import told
@@ -61,7 +62,7 @@ def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[Auto
             series_figure(found.judged),
         ),
     )
-    return Found(answer, tuple(_finding(one) for one in found.checks if one.is_bad))
+    return Found(answer, (*(_finding(one) for one in found.checks if one.is_bad), *messages.findings(flight)))
 
 
 def _checked(flight: "Flight", known: Known, settings: HealthSettings) -> _Checked:

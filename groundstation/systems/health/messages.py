@@ -20,11 +20,13 @@ from groundstation.base.ardupilot_codes import (
 )
 from groundstation.base.findings import Finding
 from groundstation.base.log_levels import severity_of_level, severity_of_text
+from groundstation.base.printable import printable
 from groundstation.systems.health.evidence import Event, Grade
 from groundstation.systems.health.logged import is_number, named
 from groundstation.tables.table import Flight, Table
 
 ULOG_TEXT, DATAFLASH_TEXT, MAVLINK_TEXT = "raw.ulog.text", "raw.MSG", "raw.STATUSTEXT"
+_COLOURS, _MODULE = re.compile("\x1b\\[[0-9;]*m"), re.compile(r"^\[\w+\]\s+(?=\S)")
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
 _GRAVE_EVENTS, _LIGHT_EVENTS = (19, 51, 54), (34, 35, 59, 60, 62)  # EV that are a failure, and a warning
 _ESTIMATOR_EVENTS = (60, 62)
@@ -65,9 +67,21 @@ def _read(flight: Flight) -> Iterator[Message]:
         texts = table.text(field).tolist()
         levels: list[int | str | None] = _levels(table, level) if level else [None] * len(texts)
         for time_ns, text, one in zip(table.time_ns.tolist(), texts, levels, strict=True):
-            if text.strip():
-                grade = severity_of_text(text) if one is None else severity_of_level(one, text)
-                yield Message(time_ns, grade, text.strip(), topic)
+            said = plain(text)
+            if said:
+                grade = severity_of_text(said) if one is None else severity_of_level(one, said)
+                yield Message(time_ns, grade, said, topic)
+
+
+def plain(text: str) -> str:
+    """Return what was said, without colours of a terminal and without the module that said it.
+
+    Examples
+    --------
+    >>> plain("\\x1b[33m[commander] Failsafe activated\\x1b[0m")
+    'Failsafe activated'
+    """
+    return _MODULE.sub("", printable(_COLOURS.sub("", text)).strip())
 
 
 def _levels(table: Table, field: str) -> list[int | str | None]:
@@ -168,7 +182,7 @@ def _mode_names(flight: Flight) -> dict[int, str]:
 def findings(flight: Flight) -> tuple[Finding, ...]:
     """Return a finding for each kind of warning or failure that was said.
 
-    It has how often, and when first.
+    It has how often and when first. A finding that fails would say that the log could not be processed: it warns.
 
     Texts that differ in numbers alone are one kind. Beyond ``MOST_TOLD`` kinds the rest is counted.
     """
@@ -189,4 +203,4 @@ def _finding(flight: Flight, group: list[Event]) -> Finding:
     first = group[0]
     times = "" if len(group) == 1 else f", {len(group)} times"
     place = f"at {flight.seconds(np.array([first.time_ns]))[0]:.1f} s"
-    return Finding(first.grade, "health.said", f"{first.text}{times}", first.source, place, len(group))
+    return Finding("warn", "health.said", f"{first.text}{times}", first.source, place, len(group))

@@ -1,20 +1,18 @@
 """Evidence of a PX4 log, old and new topics, and what it says happened."""
 
-import re
 from collections.abc import Iterator, Mapping
 from itertools import chain
 
 import numpy as np
 
-from groundstation.base.printable import printable
 from groundstation.systems.health.evidence import Event, Evidence, Grade
+from groundstation.systems.health.messages import texts
 from groundstation.systems.health.px4_control import CHANGED, control_evidence
 from groundstation.systems.health.px4_estimator import RESETS, RESETS_OF_OUTPUT, estimator_evidence, resets_of
 from groundstation.systems.health.px4_sensors import sensor_evidence
 from groundstation.systems.health.px4_topics import Topic, estimators, topic
 from groundstation.tables.table import Flight
 
-MODULE = re.compile(r"\[(\w+)\]\s+")  # of the autopilot, which wrote a text
 OWN = (
     "raw.vehicle_status",
     "raw.estimator_status",
@@ -22,15 +20,6 @@ OWN = (
     "raw.sensor_combined",
     "raw.vehicle_gps_position",
 )
-TEXT = "raw.ulog.text"
-COLOURS = re.compile("\x1b\\[[0-9;]*m")  # of a terminal
-GRADES: Mapping[str, Grade] = {
-    "emergency": "fail",
-    "alert": "fail",
-    "critical": "fail",
-    "error": "fail",
-    "warning": "warn",
-}
 MODES: Mapping[int, str] = {
     0: "Manual",
     1: "Altitude",
@@ -68,22 +57,8 @@ def events(flight: Flight) -> tuple[Event, ...]:
 
     Messages are graded by their own level; then changes of mode and arming, resets and switches.
     """
-    found = chain(_texts(flight), _modes(flight), _resets(flight), _switches(flight))
+    found = chain(texts(flight), _modes(flight), _resets(flight), _switches(flight))
     return tuple(sorted(found, key=lambda one: one.time_ns))
-
-
-def _texts(flight: Flight) -> Iterator[Event]:
-    if TEXT not in flight:
-        return
-    table = flight[TEXT]
-    for time_ns, severity, text in zip(table.time_ns, table.text("severity"), table.text("text"), strict=True):
-        grade = GRADES.get(str(severity), "info")
-        if grade == "info" and "failsafe" in str(text).lower():
-            grade = "warn"  # a failsafe is not information
-        shown = printable(COLOURS.sub("", str(text))).strip()
-        module = MODULE.match(shown)
-        source = f"{TEXT} {module[1]}" if module else TEXT
-        yield Event("faults", int(time_ns), grade, shown[module.end() :] if module else shown, source)
 
 
 def _modes(flight: Flight) -> Iterator[Event]:

@@ -9,6 +9,7 @@ from groundstation.systems.health.answer import FIRST, Check
 
 MOST_OTHERS = 2
 MOSTLY = 0.8  # of the time: a longer span is "throughout"
+QUOTED = ("faults", "battery", "gnss", "link")  # checks of which what was said is quoted
 LONGEST = 50  # characters of a message that the sentence quotes
 GOOD: Mapping[str, str] = {"gnss": "GNSS good", "innovations": "filter healthy", "vibration": "vibration low"}
 WARN: Mapping[str, str] = {
@@ -104,15 +105,16 @@ def _special(check: Check) -> str:
         fix = next((one for one in check.measures if one.quantity == "fix_type"), None)
         if fix is not None and fix.red_share == 1.0:
             return "GNSS never had a fix"
+    if check.key in QUOTED and check.first_event_s is not None:
+        first = check.reason.partition("; ")[0]
+        if len(first) <= LONGEST:
+            return f"“{first}”"
     measure = check.decisive
     if measure is not None and measure.quantity in OF_QUANTITY:
         return OF_QUANTITY[measure.quantity]
     if measure is not None and measure.quantity.endswith("_unused"):
         beside = {"innovations": "doubts its sensors", "resets": "went its own way"}.get(check.key, "is in doubt")
         return f"a filter not in use {beside}"
-    if check.key == "faults" and check.first_event_s is not None:
-        first = check.reason.partition("; ")[0]
-        return f"“{first}”" if len(first) <= LONGEST else ""
     return ""
 
 

@@ -56,7 +56,7 @@ def _lanes(recorder: Recorder, answer: AutopilotHealth, data: HealthLanes | None
     if data is None:
         return None
     titles = [one.title for one in answer.checks if np.any(data.check == one.title)]
-    paths = [f"health/lanes/{place:02d} {part}" for place, part in enumerate(path_parts(titles))]
+    paths = [f"health/lanes/{place:02d}_{part}" for place, part in enumerate(path_parts(titles))]
     for title, path in zip(titles, paths, strict=True):
         own = data.where(data.check == title)
         order = np.argsort(own.start_s, kind="stable")

@@ -259,7 +259,8 @@ def test_a_failsafe_is_a_warning_and_an_error_a_failure() -> None:
     texts = {
         10.0: ("info", "[logger] start"),
         40.0: ("info", "[commander] Failsafe mode: RTL"),
-        45.0: ("error", "Low battery"),
+        45.0: ("error", "Motor 2 failed"),
+        50.0: ("error", "[health_and_arming_checks] Low battery"),
     }
     text = table(
         "raw.ulog.text",
@@ -267,8 +268,11 @@ def test_a_failsafe_is_a_warning_and_an_error_a_failure() -> None:
         severity=[one for one, _ in texts.values()],
         text=[one for _, one in texts.values()],
     )
-    check = answered(*new(), text).check("faults")
-    assert (check.verdict, check.reason, check.first_event_s) == ("fail", "Low battery", 45.0)
+    answer = answered(*new(), text)
+    check = answer.check("faults")
+    assert (check.verdict, check.reason, check.first_event_s) == ("fail", "Motor 2 failed", 45.0)
+    assert (answer.check("battery").verdict, answer.check("battery").reason) == ("fail", "Low battery")
+    assert answer.sentence.endswith("“Motor 2 failed” at 0:45, “Low battery” at 0:50")
     only = table("raw.ulog.text", [40.0], severity=["info"], text=["\x1b[33m[commander] Failsafe mode: RTL\x1b[0m"])
     check = answered(*new(), only).check("faults")
     assert (check.verdict, check.reason) == ("warn", "Failsafe mode: RTL")
