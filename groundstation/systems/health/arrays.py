@@ -4,7 +4,11 @@ from groundstation.results.arrays.typed import Arrays, Counts, Floats, Texts
 
 
 class HealthLanes(Arrays, figure="health_lanes", digits={"start_s": 2, "end_s": 2}):
-    """Spans in which the worst quantity of a check is good, amber or red."""
+    """Spans in which the worst quantity of a check is good, amber or red.
+
+    ``check`` is its title, ``grade`` one of ``good``, ``amber`` and ``red``. Events are drawn as short spans. Time
+    without a span is time in which nothing of the check is logged.
+    """
 
     check: Texts
     start_s: Floats
