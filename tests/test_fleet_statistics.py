@@ -165,6 +165,18 @@ def test_outliers_are_named_with_their_flight_and_reason() -> None:
     assert answer.outliers(table(error_deg=error, aircraft=[""] * 40)) == ()
 
 
+def test_an_aircraft_that_shakes_more_than_it_did_is_an_outlier_and_a_change() -> None:
+    rng = np.random.default_rng(12)
+    vibration = np.exp(rng.normal(np.log(2.0), 0.1, 40))
+    vibration[11], start = 9.0, [int(1_700_000_000_000_000_000 + day * DAY_NS) for day in range(40)]
+    found = answer.outliers(table(health_vibration_mps2=vibration))
+    assert [(one.flight_id, one.quantity) for one in found] == [("F0011", "health_vibration_mps2")]
+    assert "vibration in the air, m/s2: 9, usual for this aircraft 1.98" in found[0].reason
+    risen = np.where(np.arange(40) >= 20, 2.0, 1.0) * np.exp(rng.normal(np.log(2.0), 0.1, 40))
+    _, (change,) = answer.trends(table(health_vibration_mps2=risen, start_utc=start), ChangeSettings())
+    assert (change.quantity, change.flight_id) == ("health_vibration_mps2", "F0020")
+
+
 def test_trend_is_in_order_of_time_and_names_the_first_flight_of_a_level() -> None:
     rng = np.random.default_rng(11)
     order = rng.permutation(50)  # flights are listed by name, flown in another order

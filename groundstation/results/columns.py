@@ -22,6 +22,7 @@ READ_BY_FLEETS: Mapping[str, Kind] = {
             *("estimate_sd_deg", "sample_mean_deg", "sample_m2_deg2", "onboard_difference_deg"),
             *("reference_residual_arcmin", "radial_error_rate_fit_nmiph", "forecast_60min_rms_m"),
             *("magnetic_before_rms_deg", "magnetic_after_rms_deg"),
+            *("health_vibration_mps2", "health_hdop", "health_test_ratio"),
             *(f"magnetic_{letter.lower()}{end}_deg" for letter in LETTERS for end in ("", "_sigma")),
         ),
         "number",

@@ -21,7 +21,9 @@ from groundstation.results.roles import LETTERS
 if TYPE_CHECKING:
     import pandas as pd
 
-TrendQuantity = Literal["error_deg", "radial_error_rate_fit_nmiph"]
+TrendQuantity = Literal[
+    "error_deg", "radial_error_rate_fit_nmiph", "health_vibration_mps2", "health_hdop", "health_test_ratio"
+]
 WHOLE_FLEET = ""  # where an aircraft is named and all of them are meant
 
 

@@ -18,6 +18,9 @@ QUANTITIES: Mapping[str, tuple[str, str, int]] = {  # title, unit, decimals
     "reference_residual_arcmin": ("parking heading − reference", "′", 1),
     "radial_error_rate_fit_nmiph": ("INS error rate", "nmi/h", 2),
     "forecast_60min_rms_m": ("forecast error after 60 min", "m", 0),
+    "health_vibration_mps2": ("vibration in the air", "m/s²", 2),
+    "health_hdop": ("HDOP in the air", "", 2),
+    "health_test_ratio": ("largest innovation test ratio", "", 2),
 }
 
 

@@ -13,7 +13,13 @@ from groundstation.chapters.parts import Cell, Figure, Grid, Head, Note, Part, S
 from groundstation.chapters.wording import number, significant
 from groundstation.results.fleet import ChangePoint, FleetResults
 
-QUANTITIES = {"error_deg": "error, °", "radial_error_rate_fit_nmiph": "nmi/h"}
+QUANTITIES = {
+    "error_deg": "error, °",
+    "radial_error_rate_fit_nmiph": "nmi/h",
+    "health_vibration_mps2": "m/s²",
+    "health_hdop": "HDOP",
+    "health_test_ratio": "test ratio",
+}
 LEAD = "Has an aircraft changed? Every flight in order of time against the level of its aircraft."
 
 

@@ -28,8 +28,12 @@ FloatArray = NDArray[np.float64]
 PIT_BINS = 10
 
 # Figures that are positive and skewed are judged by their logarithm.
-POSITIVE = {"standard_error_deg", "estimate_sd_deg", "radial_error_rate_fit_nmiph", "forecast_60min_rms_m"}
-TRENDS: tuple[TrendQuantity, ...] = ("error_deg", "radial_error_rate_fit_nmiph")
+OF_AUTOPILOTS: tuple[TrendQuantity, ...] = ("health_vibration_mps2", "health_hdop", "health_test_ratio")
+POSITIVE = {
+    *("standard_error_deg", "estimate_sd_deg", "radial_error_rate_fit_nmiph", "forecast_60min_rms_m"),
+    *OF_AUTOPILOTS,
+}
+TRENDS: tuple[TrendQuantity, ...] = ("error_deg", "radial_error_rate_fit_nmiph", *OF_AUTOPILOTS)
 LOOKED_AT: Mapping[str, str] = {
     "error_deg": "heading error, deg",
     "standard_error_deg": "standard error of the heading error, deg",
@@ -38,6 +42,9 @@ LOOKED_AT: Mapping[str, str] = {
     "reference_residual_arcmin": "parking heading - reference, arcmin",
     "radial_error_rate_fit_nmiph": "INS radial error rate, nmi/h",
     "forecast_60min_rms_m": "forecast error after 60 min, m",
+    "health_vibration_mps2": "vibration in the air, m/s2",
+    "health_hdop": "HDOP in the air",
+    "health_test_ratio": "largest innovation test ratio",
 }
 CHECKS: Mapping[str, str] = {
     "reference": "corrected parking heading against its reference",
