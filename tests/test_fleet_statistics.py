@@ -173,8 +173,8 @@ def test_an_aircraft_that_shakes_more_than_it_did_is_an_outlier_and_a_change() -
     assert [(one.flight_id, one.quantity) for one in found] == [("F0011", "health_vibration_mps2")]
     assert "vibration in the air, m/s2: 9, usual for this aircraft 1.98" in found[0].reason
     risen = np.where(np.arange(40) >= 20, 2.0, 1.0) * np.exp(rng.normal(np.log(2.0), 0.1, 40))
-    _, (change,) = answer.trends(table(health_vibration_mps2=risen, start_utc=start), ChangeSettings())
-    assert (change.quantity, change.flight_id) == ("health_vibration_mps2", "F0020")
+    _, changes = answer.trends(table(health_vibration_mps2=risen, start_utc=start), ChangeSettings())
+    assert ("health_vibration_mps2", "F0020") in [(one.quantity, one.flight_id) for one in changes]
 
 
 def test_trend_is_in_order_of_time_and_names_the_first_flight_of_a_level() -> None:
