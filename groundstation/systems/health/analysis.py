@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from groundstation.systems.health.checks import Judged
-    from groundstation.systems.health.evidence import Event, Spans
+    from groundstation.systems.health.evidence import Event, Evidence, Spans
     from groundstation.tables.table import Flight
 
 CODE = "health"
@@ -65,8 +65,17 @@ def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[Auto
     return Found(answer, (*(_finding(one) for one in found.checks if one.is_bad), *messages.findings(flight)))
 
 
-def _checked(flight: "Flight", known: Known, settings: HealthSettings) -> _Checked:
-    """Judge the flight.
+class _Read(NamedTuple):
+    """Evidence that a log holds, and when it flew."""
+
+    autopilot: str
+    air: "Spans"
+    evidence: "tuple[Evidence, ...]"
+    events: "tuple[Event, ...]"
+
+
+def _read(flight: "Flight", known: Known) -> _Read:
+    """Read the evidence of a flight.
 
     Raises
     ------
@@ -74,28 +83,37 @@ def _checked(flight: "Flight", known: Known, settings: HealthSettings) -> _Check
         Where the log holds nothing that a check judges.
     """
     from groundstation.systems.health.autopilots import autopilot_of
-    from groundstation.systems.health.checks import judge
     from groundstation.systems.health.evidence import in_the_air
-    from groundstation.systems.health.limits import thresholds
 
     autopilot = autopilot_of(flight)
     if autopilot is None:
         raise NotAssessableError(CODE, "the log is of no autopilot whose messages are known")
-    air = in_the_air(flight, known)
     evidence, events = autopilot.evidence(flight), autopilot.events(flight)
-    checks, judged = judge(flight, evidence, events, air, thresholds(settings.thresholds))
-    if not judged and not events:
+    if not events and not any(bool(np.isfinite(one.value).any()) for one in evidence):
         raise NotAssessableError(CODE, "the log holds no field that a check of the autopilot judges")
-    return _Checked(autopilot.name, air, checks, judged, events)
+    return _Read(autopilot.name, in_the_air(flight, known), evidence, events)
 
 
-def _examine(flight: "Flight", known: Known, settings: HealthSettings) -> tuple[Shortfall, ...]:
+def _checked(flight: "Flight", known: Known, settings: HealthSettings) -> _Checked:
+    """Judge the flight; raises as :func:`_read`."""
+    from groundstation.systems.health.checks import judge
+    from groundstation.systems.health.limits import thresholds
+
+    found = _read(flight, known)
+    checks, judged = judge(flight, found.evidence, found.events, found.air, thresholds(settings.thresholds))
+    return _Checked(found.autopilot, found.air, checks, judged, found.events)
+
+
+def _examine(flight: "Flight", known: Known, _settings: HealthSettings) -> tuple[Shortfall, ...]:
     """Report the checks that cannot be judged.
 
-    Also that the whole log was judged, where nothing says that it flew.
+    Also that the whole log would be judged, where nothing says that it flew.
     """
-    found = _checked(flight, known, settings)
-    missing = [one.title for one in found.checks if one.verdict == "not_logged"]
+    from groundstation.systems.health.checks import CHECKS, logged
+
+    found = _read(flight, known)
+    there = logged(found.evidence, found.events, found.air)
+    missing = [title for key, title in CHECKS.items() if key not in there]
     told = [] if found.air.is_flown else [Shortfall("nothing says that it flew: judged over the whole log")]
     return (*told, *([Shortfall(f"not logged: {', '.join(missing)}")] if missing else []))
 

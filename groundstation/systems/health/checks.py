@@ -95,6 +95,16 @@ def judge(
     return tuple(checks), tuple(judged)
 
 
+def logged(evidence: Iterable[Evidence], events: Iterable[Event], air: Spans) -> frozenset[str]:
+    """Return the keys of the checks that have something logged in the spans."""
+    found = {one.check for one in events if bool(air.hold(np.array([one.time_ns]))[0])}
+    for one in evidence:
+        is_judged = air.is_flown or one.check not in ONLY_FLOWN
+        if one.check not in found and is_judged and bool((np.isfinite(one.value) & air.hold(one.time_ns)).any()):
+            found.add(one.check)
+    return frozenset(found)
+
+
 @dataclass(frozen=True, eq=False)
 class _Clock:
     """Rows of a topic: until when each speaks, and for how many seconds.

@@ -13,7 +13,7 @@ from groundstation.systems.health.evidence import FloatArray
 MOST_POINTS = 600  # of a quantity
 GRADES = ("good", "amber", "red")
 SHORTEST_SHARE = 1 / 2_000  # of the log: shorter breaks of a lane are not drawn
-EVENT_SHARE = 1 / 400  # of the log that an event is drawn as
+EVENT_SHARE = 1 / 200  # of the log that an event is drawn as
 Spans = tuple[FloatArray, FloatArray]
 
 

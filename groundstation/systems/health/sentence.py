@@ -140,6 +140,6 @@ def clock(seconds: float) -> str:
     >>> clock(723.4), clock(3725.0)
     ('12:03', '1:02:05')
     """
-    hours, rest = divmod(int(max(seconds, 0.0)), 3600)
+    hours, rest = divmod(round(max(seconds, 0.0)), 3600)
     tail = f"{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"
     return f"{hours}:{tail}" if hours else tail

@@ -420,6 +420,14 @@ def test_examine_says_which_checks_have_nothing_to_judge() -> None:
         )
 
 
+@pytest.mark.parametrize("tables", [old(), new(), new()[:2]], ids=["1.10", "1.13", "few"])
+def test_examine_and_run_agree_on_what_is_not_logged(tables: tuple[Table, ...]) -> None:
+    assert HEALTH.examine is not None
+    (found,) = HEALTH.examine(flight(*tables), KNOWN, HealthSettings())
+    missing = [one.title for one in answered(*tables).checks if one.verdict == "not_logged"]
+    assert found.text == f"not logged: {', '.join(missing)}"
+
+
 def test_measures_of_checks_are_those_of_the_answer_in_their_order() -> None:
     answer = answered(*new())
     checks: tuple[Check, ...] = answer.checks
