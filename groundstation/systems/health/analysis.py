@@ -39,7 +39,7 @@ class _Checked(NamedTuple):
 
 def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[AutopilotHealth]:
     from groundstation.systems.health import messages
-    from groundstation.systems.health.checks import worst_of
+    from groundstation.systems.health.checks import verdict_of
     from groundstation.systems.health.figures import lanes_figure, series_figure
     from groundstation.systems.health.sentence import told
 
@@ -47,7 +47,7 @@ def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[Auto
     happenings = _happenings(flight, found.events, found.air)
     listed = _listed(happenings, settings.most_messages)
     answer = AutopilotHealth(
-        verdict=worst_of(one.verdict for one in found.checks),
+        verdict=verdict_of(found.checks),
         sentence=told(found.checks),
         autopilot=found.autopilot,
         judged_over=found.air.words,

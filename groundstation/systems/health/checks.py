@@ -10,7 +10,7 @@ import numpy as np
 
 from groundstation.base.records import Int64Array
 from groundstation.base.units import NS_PER_S
-from groundstation.systems.health.answer import Check, Measure, Verdict
+from groundstation.systems.health.answer import FIRST, Check, Measure, Verdict
 from groundstation.systems.health.evidence import Event, Evidence, FloatArray, Spans
 from groundstation.systems.health.limits import Threshold
 from groundstation.tables.table import Flight
@@ -311,6 +311,16 @@ def worst_of(verdicts: Iterable[Verdict]) -> Verdict:
     ('warn', 'not_logged')
     """
     return max(verdicts, key=ORDER.index, default="not_logged")
+
+
+def verdict_of(checks: Sequence[Check]) -> Verdict:
+    """Return the verdict of a flight: the worst of its checks.
+
+    A log without GNSS, filter and vibration passes nothing by the little that it holds.
+    """
+    verdict = worst_of(one.verdict for one in checks)
+    is_known = any(one.key in FIRST and one.verdict != "not_logged" for one in checks)
+    return "not_logged" if verdict == "pass" and not is_known else verdict
 
 
 def _check(

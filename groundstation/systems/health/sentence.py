@@ -73,7 +73,10 @@ def told(checks: Sequence[Check]) -> str:
     GNSS, filter and vibration, then what else warns or fails, the worst first.
     """
     known = {one.key: one for one in checks}
-    parts = [_part(known[key]) for key in FIRST if key in known]
+    first = [known[key] for key in FIRST if key in known]
+    parts = [_part(one) for one in first]
+    if all(one.verdict == "not_logged" for one in first):
+        parts = ["GNSS, filter and vibration not logged"]
     others = sorted((one for one in checks if one.key not in FIRST and one.is_bad), key=_gravity)
     parts += [_part(one) for one in others[:MOST_OTHERS]]
     if len(others) > MOST_OTHERS:

@@ -323,6 +323,12 @@ def test_a_tilt_that_lags_its_setpoint_is_found_whatever_the_heading() -> None:
     assert measure.red_share == pytest.approx(0.25, abs=0.01)
 
 
+def test_a_log_without_gnss_filter_and_vibration_passes_nothing() -> None:
+    answer = answered(table("raw.vehicle_attitude", TIME, **LEVEL), table("raw.cpuload", TIME, load=0.4))
+    assert answer.check("timing").verdict == "pass"
+    assert (answer.verdict, answer.sentence) == ("not_logged", "GNSS, filter and vibration not logged")
+
+
 def test_drop_outs_of_the_log_are_told_and_none_is_a_pass() -> None:
     information = table("raw.ulog.information", [0.0], name=["sys_name"], text=["PX4"])
     status = table("raw.vehicle_status", TIME, nav_state=2.0)
