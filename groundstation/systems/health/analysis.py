@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from groundstation.systems.health.checks import Judged
     from groundstation.systems.health.evidence import Event, Spans
+    from groundstation.systems.health.parameters import Settings
     from groundstation.tables.table import Flight
 
 CODE = "health"
@@ -35,14 +36,17 @@ class _Checked(NamedTuple):
     checks: tuple[Check, ...]
     judged: "tuple[Judged, ...]"
     events: "tuple[Event, ...]"
+    stated: "Settings"
 
 
 def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[AutopilotHealth]:
     from groundstation.systems.health.checks import worst_of
     from groundstation.systems.health.figures import lanes_figure, series_figure
     from groundstation.systems.health.sentence import told
+    from groundstation.tables.estimator_in_use import estimator_in_use
 
     found = _checked(flight, known, settings)
+    used = estimator_in_use(flight)
     happenings = _happenings(flight, found.events, found.air)
     listed = _listed(happenings, settings.most_messages)
     answer = AutopilotHealth(
@@ -55,6 +59,12 @@ def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[Auto
         checks=found.checks,
         happenings=listed,
         happenings_left_out=len(happenings) - len(listed),
+        settings_found=found.stated.found,
+        parameters_logged=found.stated.logged,
+        has_defaults=found.stated.has_defaults,
+        differing=found.stated.differing,
+        estimator="" if used is None else used.name,
+        estimator_source="" if used is None else used.source,
         settings=_stated(settings),
         figures=(
             lanes_figure(found.judged, happenings, flight.duration_s),
@@ -76,16 +86,21 @@ def _checked(flight: "Flight", known: Known, settings: HealthSettings) -> _Check
     from groundstation.systems.health.checks import judge
     from groundstation.systems.health.evidence import in_the_air
     from groundstation.systems.health.limits import thresholds
+    from groundstation.systems.health.parameters import events as events_of_settings
+    from groundstation.systems.health.parameters import settings_of
 
     autopilot = autopilot_of(flight)
     if autopilot is None:
         raise NotAssessableError(CODE, "the log is of no autopilot whose messages are known")
     air = in_the_air(flight, known)
     evidence, events = autopilot.evidence(flight), autopilot.events(flight)
-    checks, judged = judge(flight, evidence, events, air, thresholds(settings.thresholds))
+    stated = settings_of(flight, known)
+    checks, judged = judge(
+        flight, evidence, (*events, *events_of_settings(stated, air)), air, thresholds(settings.thresholds)
+    )
     if not judged and not events:
         raise NotAssessableError(CODE, "the log holds no field that a check of the autopilot judges")
-    return _Checked(autopilot.name, air, checks, judged, events)
+    return _Checked(autopilot.name, air, checks, judged, events, stated)
 
 
 def _examine(flight: "Flight", known: Known, settings: HealthSettings) -> tuple[Shortfall, ...]:
@@ -157,6 +172,7 @@ HEALTH = Analysis(
     needs="the autopilot's own messages: PX4 ULog, ArduPilot DataFlash or tlog",
     settings=HealthSettings,
     answer=AutopilotHealth,
+    builds_on=("latency",),
     run=_run,
     applies=_applies,
     sentence=_sentence,
