@@ -7,6 +7,8 @@ of each vehicle, 4.7.0-dev of 2025-10-24. Numbers were added and never reused si
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from groundstation.base.findings import Severity
+
 EVENTS: Mapping[int, str] = MappingProxyType(
     {
         10: "armed",
@@ -100,7 +102,8 @@ SUBSYSTEMS: Mapping[int, str] = MappingProxyType(
     }
 )
 GRAVE_SUBSYSTEMS = frozenset((5, 6, 7, 8, 12, 16, 17, 19, 20, 23, 25, 26, 27, 29, 30, 31))
-_LANES, _MODES = 24, 10
+LANES, _MODES = 24, 10
+GRAVE_EVENTS, LIGHT_EVENTS = frozenset((19, 51, 54)), frozenset((34, 35, 59, 60, 62, 67, 90))
 _CODES: Mapping[tuple[int, int], str] = MappingProxyType(
     {
         (1, 1): "late",
@@ -142,7 +145,7 @@ def error_name(subsystem: int, code: int) -> str:
     >>> error_name(6, 1), error_name(6, 0), error_name(11, 2), error_name(99, 7)
     ('failsafe of the battery', 'failsafe of the battery over', 'GPS: glitch', 'error 99: code 7')
     """
-    if subsystem == _LANES:
+    if subsystem == LANES:
         return f"EKF lane changed to {code}"
     name = SUBSYSTEMS.get(subsystem, f"error {subsystem}")
     if subsystem == _MODES:
@@ -151,6 +154,26 @@ def error_name(subsystem: int, code: int) -> str:
         return f"{name} over"
     told = _CODES.get((subsystem, code), "" if name.startswith("failsafe") and code == 1 else f"code {code}")
     return f"{name}: {told}" if told else name
+
+
+def error_severity(subsystem: int, code: int) -> Severity:
+    """Grade an ERR record: information where it says that an error is over.
+
+    Examples
+    --------
+    >>> error_severity(6, 1), error_severity(6, 0), error_severity(11, 2), error_severity(24, 0)
+    ('fail', 'info', 'warn', 'warn')
+    """
+    if subsystem == LANES:
+        return "warn"
+    if code == 0:
+        return "info"
+    return "fail" if subsystem in GRAVE_SUBSYSTEMS else "warn"
+
+
+def event_severity(number: int) -> Severity:
+    """Grade an EV record."""
+    return "fail" if number in GRAVE_EVENTS else "warn" if number in LIGHT_EVENTS else "info"
 
 
 # Rsn of MODE, from 3.4 on.
@@ -256,3 +279,8 @@ MODES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "ArduSub": _SUB,
     }
 )
+
+
+def mode_severity(reason: int) -> Severity:
+    """Grade a change of mode by its reason: a failsafe that made it fails."""
+    return "fail" if reason in BAD_MODE_REASONS else "info"

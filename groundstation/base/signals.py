@@ -141,7 +141,7 @@ TOPICS: Mapping[str, tuple[Field, ...]] = MappingProxyType(
             _heading("course_magnetic_deg"),
         ),
         "discrete": (_flag("weight_on_wheels"),),
-        "event": (_text("name"),),
+        "event": (_text("name"), _text("severity")),
         "link": (
             _double("pseudorange_m", "m"),
             _double("transmission_time_s", "s"),

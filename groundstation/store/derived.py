@@ -224,13 +224,16 @@ class LogWriter(DerivedWriter):
         self._entries: list[tuple[int, int, str, str]] = []
 
     def add_events(self, batch: RecordBatch) -> None:
-        """Take in the names of events."""
+        """Take in the names of events, each with its grade, information where it has none."""
         column = batch.columns.get("name")
         if column is None or batch.time_ns is None:
             return
         said = np.flatnonzero(column.mask & (column.values != ""))
-        for time_ns, name in zip(batch.time_ns[said].tolist(), column.values[said].tolist(), strict=True):
-            self._entries.append((time_ns, LEVELS["info"], name, batch.topic))
+        grade = batch.columns.get("severity")
+        graded = np.full(len(batch), "info") if grade is None else np.where(grade.mask, grade.values, "info")
+        rows = (batch.time_ns[said].tolist(), column.values[said].tolist(), graded[said].tolist())
+        for time_ns, name, severity in zip(*rows, strict=True):
+            self._entries.append((time_ns, LEVELS.get(severity, LEVELS["info"]), name, batch.topic))
 
     def finish(self, channel_id: int, findings: Iterable[Finding], first_ns: int, last_ns: int) -> None:
         """Write all lines in order of time.

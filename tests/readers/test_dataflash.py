@@ -226,6 +226,7 @@ def test_events_and_landed_flag(tmp_path: Path) -> None:
         *("ArduCopter V4.3.0", "armed", "mode LOITER", "not landed", "land complete", "disarmed", "event 250"),
         "EKF check: bad variance",
     ]
+    assert log.present("event", "severity") == [*(["info"] * 7), "fail"]
     assert log.present("discrete", "weight_on_wheels") == [False, True], "unknown before the first event"
     assert "land" in log.derived("discrete", "weight_on_wheels")
 

@@ -111,6 +111,7 @@ def test_a_flight_is_mapped(tmp_path: Path) -> None:
     assert gnss.values("velocity_east_mps")[1] == pytest.approx(5.0) and gnss.values("hdop")[1] == pytest.approx(1.2)
     assert gnss.values("altitude_ellipsoid_m")[1] == 214.0 and gnss.values("velocity_sigma_mps")[1] == 0.3
     assert flight["event"].columns["name"].values.tolist() == ["disarmed", "armed", "Landed; safely"]
+    assert flight["event"].columns["severity"].values.tolist() == ["info", "info", "info"]
     assert ins.time_ns[0] == START_US * 1_000
 
 

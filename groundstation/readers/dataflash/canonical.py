@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_360
-from groundstation.base.ardupilot_codes import EVENTS, MODES, error_name
+from groundstation.base.ardupilot_codes import EVENTS, MODES, error_name, error_severity, event_severity, mode_severity
 from groundstation.base.atmosphere import REFUSED, pressure_altitude_m
 from groundstation.base.geodesy import has_position
+from groundstation.base.log_levels import severity_of_text
 from groundstation.base.records import BoolArray, Column, Damage, RecordBatch, Remark, frozen
 from groundstation.readers.dataflash import rules
 from groundstation.readers.dataflash.choices import Choices
@@ -268,7 +269,7 @@ class Mapper:
 
     def _event(self, topic: str, rows: RecordRows) -> dict[str, Column]:
         names = event_names(rows, self._choices.vehicle)
-        return {} if names is None else {"name": Column(names)}
+        return {} if names is None else {"name": Column(names), "severity": Column(event_severities(rows, names))}
 
 
 def event_names(rows: RecordRows, vehicle: str) -> NDArray[np.str_] | None:
@@ -293,11 +294,26 @@ def event_names(rows: RecordRows, vehicle: str) -> NDArray[np.str_] | None:
     return None
 
 
+def event_severities(rows: RecordRows, names: NDArray[np.str_]) -> NDArray[np.str_]:
+    """Return the grade of each record of EV, ARM, MODE, MSG or ERR."""
+    match rows.definition.name:
+        case "MSG":
+            return _named(names, severity_of_text)
+        case "EV":
+            return _named(rows.values("Id"), event_severity)
+        case "MODE" if rows.definition.has_integers("Rsn"):
+            return _named(rows.values("Rsn"), mode_severity)
+        case "ERR":
+            subsystem, code = (rows.values(name).astype(np.int64) for name in ("Subsys", "ECode"))
+            return _named(subsystem * 1000 + code, lambda pair: error_severity(pair // 1000, pair % 1000))
+    return np.full(len(rows), "info")
+
+
 def _mode(number: int, known: tuple[str, ...]) -> str:
     name = known[number] if 0 <= number < len(known) else ""
     return f"mode {name or number}"
 
 
-def _named(values: NDArray[Any], name_of: Callable[[int], str]) -> NDArray[np.str_]:
+def _named(values: NDArray[Any], name_of: Callable[[Any], str]) -> NDArray[np.str_]:
     distinct, which = np.unique(values, return_inverse=True)
     return np.array([name_of(value) for value in distinct.tolist()], dtype=np.str_)[which]

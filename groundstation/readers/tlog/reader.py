@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.geodesy import NO_POSITION
+from groundstation.base.log_levels import severity_of_level
 from groundstation.base.records import Column, Damage, Int64Array, Item, LogHeader, Remark
 from groundstation.base.signals import EVENT_SEPARATOR, RAW_PREFIX
 from groundstation.readers.mapping import Assignment, OfferedMessages, assigned, mapped
@@ -229,20 +230,30 @@ class _Arming:
             texts = part.columns["text"].values
             shown = np.flatnonzero(texts != "")
             names = np.char.replace(texts[shown], EVENT_SEPARATOR.strip(), ";")
-            self._add(canonical, part, shown, names)
+            levels = part.columns["severity"].values[shown].tolist()
+            grades = [severity_of_level(level, text) for level, text in zip(levels, texts[shown].tolist(), strict=True)]
+            self._add(canonical, part, shown, names, np.array(grades, dtype=np.str_))
         elif name == "HEARTBEAT":
             armed = (part.columns["base_mode"].values & ARMED) != 0
             before = np.concatenate(([armed[0] if self.is_armed is None else self.is_armed], armed[:-1]))
             changed = np.flatnonzero((armed != before) | (np.arange(len(armed)) == 0) & (self.is_armed is None))
             self.is_armed = bool(armed[-1])
-            self._add(canonical, part, changed, np.where(armed[changed], "armed", "disarmed"))
+            names = np.where(armed[changed], "armed", "disarmed")
+            self._add(canonical, part, changed, names, np.full(len(changed), "info"))
 
     def _add(
-        self, canonical: dict[str, list[TopicPart]], part: TopicPart, rows: Int64Array, names: NDArray[np.str_]
+        self,
+        canonical: dict[str, list[TopicPart]],
+        part: TopicPart,
+        rows: Int64Array,
+        names: NDArray[np.str_],
+        grades: NDArray[np.str_],
     ) -> None:
         if len(rows):
             validity_ns = None if part.validity_ns is None else part.validity_ns[rows]
-            event = TopicPart(part.index[rows], part.time.take(rows), {"name": Column(names)}, validity_ns)
+            event = TopicPart(
+                part.index[rows], part.time.take(rows), {"name": Column(names), "severity": Column(grades)}, validity_ns
+            )
             canonical.setdefault("event", []).append(event)
 
 

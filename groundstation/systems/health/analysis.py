@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from groundstation.systems.health.checks import Judged
     from groundstation.systems.health.evidence import Event, Evidence, Spans
+    from groundstation.systems.health.parameters import Settings
     from groundstation.tables.table import Flight
 
 CODE = "health"
@@ -35,6 +36,7 @@ class _Checked(NamedTuple):
     checks: tuple[Check, ...]
     judged: "tuple[Judged, ...]"
     events: "tuple[Event, ...]"
+    stated: "Settings"
 
 
 def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[AutopilotHealth]:
@@ -42,8 +44,10 @@ def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[Auto
     from groundstation.systems.health.checks import verdict_of
     from groundstation.systems.health.figures import lanes_figure, series_figure
     from groundstation.systems.health.sentence import told
+    from groundstation.tables.estimator_in_use import estimator_in_use
 
     found = _checked(flight, known, settings)
+    used = estimator_in_use(flight)
     happenings = _happenings(flight, found.events, found.air)
     listed = _listed(happenings, settings.most_messages)
     answer = AutopilotHealth(
@@ -56,6 +60,12 @@ def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[Auto
         checks=found.checks,
         happenings=listed,
         happenings_left_out=len(happenings) - len(listed),
+        settings_found=found.stated.found,
+        parameters_logged=found.stated.logged,
+        has_defaults=found.stated.has_defaults,
+        differing=found.stated.differing,
+        estimator="" if used is None else used.name,
+        estimator_source="" if used is None else used.source,
         settings=_stated(settings),
         figures=(
             lanes_figure(found.judged, happenings, flight.duration_s),
@@ -72,6 +82,7 @@ class _Read(NamedTuple):
     air: "Spans"
     evidence: "tuple[Evidence, ...]"
     events: "tuple[Event, ...]"
+    stated: "Settings"
 
 
 def _read(flight: "Flight", known: Known) -> _Read:
@@ -84,6 +95,8 @@ def _read(flight: "Flight", known: Known) -> _Read:
     """
     from groundstation.systems.health.autopilots import autopilot_of
     from groundstation.systems.health.evidence import in_the_air
+    from groundstation.systems.health.parameters import events as events_of_settings
+    from groundstation.systems.health.parameters import settings_of
 
     autopilot = autopilot_of(flight)
     if autopilot is None:
@@ -91,7 +104,8 @@ def _read(flight: "Flight", known: Known) -> _Read:
     evidence, events = autopilot.evidence(flight), autopilot.events(flight)
     if not events and not any(bool(np.isfinite(one.value).any()) for one in evidence):
         raise NotAssessableError(CODE, "the log holds no field that a check of the autopilot judges")
-    return _Read(autopilot.name, in_the_air(flight, known), evidence, events)
+    air, stated = in_the_air(flight, known), settings_of(flight, known)
+    return _Read(autopilot.name, air, evidence, (*events, *events_of_settings(stated, air)), stated)
 
 
 def _checked(flight: "Flight", known: Known, settings: HealthSettings) -> _Checked:
@@ -101,7 +115,7 @@ def _checked(flight: "Flight", known: Known, settings: HealthSettings) -> _Check
 
     found = _read(flight, known)
     checks, judged = judge(flight, found.evidence, found.events, found.air, thresholds(settings.thresholds))
-    return _Checked(found.autopilot, found.air, checks, judged, found.events)
+    return _Checked(found.autopilot, found.air, checks, judged, found.events, found.stated)
 
 
 def _examine(flight: "Flight", known: Known, _settings: HealthSettings) -> tuple[Shortfall, ...]:
@@ -176,6 +190,7 @@ HEALTH = Analysis(
     needs="the autopilot's own messages: PX4 ULog, ArduPilot DataFlash or tlog",
     settings=HealthSettings,
     answer=AutopilotHealth,
+    builds_on=("latency",),
     run=_run,
     applies=_applies,
     sentence=_sentence,

@@ -162,11 +162,47 @@ class Happening:
 
 
 @dataclass(frozen=True)
+class SettingFound:
+    """Setting of the autopilot beside what the flight shows.
+
+    ``found`` is None where the flight does not show it; ``reason`` says why, or what it rests on. ``source`` is the
+    topic of the parameters.
+    """
+
+    name: str
+    what: str
+    unit: str
+    stated: float
+    found: float | None
+    sigma: float | None
+    verdict: Verdict
+    reason: str
+    source: str
+
+    @property
+    def told(self) -> str:
+        """The two in a line: ``GPS_DELAY_MS: 0.22 s set, 0.12 s found``."""
+        found = "not found" if self.found is None else f"{self.found:.3g} {self.unit} found"
+        return f"{self.what} ({self.name}): {self.stated:.3g} {self.unit} set, {found}"
+
+
+@dataclass(frozen=True)
+class ChangedParameter:
+    """Parameter that differs from its default, by the log itself."""
+
+    name: str
+    value: float
+    default: float
+
+
+@dataclass(frozen=True)
 class AutopilotHealth(Answer):
     """Health of the autopilot of a flight.
 
     ``verdict`` is the worst of the checks, ``sentence`` a person's summary; ``judged_over`` says over which time
     (in the air, while armed, in the whole log) and ``judged_by`` what showed it, ``judged_s`` its length.
+    ``differing`` are the parameters off their defaults, where the log tells defaults (``has_defaults``); ``estimator``
+    flew the aircraft, empty where the log does not tell it.
     """
 
     analysis: ClassVar[str] = "health"
@@ -180,6 +216,12 @@ class AutopilotHealth(Answer):
     checks: tuple[Check, ...]
     happenings: tuple[Happening, ...] = ()
     happenings_left_out: int = 0
+    settings_found: tuple[SettingFound, ...] = ()
+    parameters_logged: int = 0
+    has_defaults: bool = False
+    differing: tuple[ChangedParameter, ...] = ()
+    estimator: str = ""
+    estimator_source: str = ""
     settings: dict[str, Any] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
 

@@ -19,6 +19,7 @@ WORDS: Mapping[Verdict, str] = {"pass": "pass", "warn": "warn", "fail": "fail", 
 HEADLINES: Mapping[Verdict, str] = {"pass": "Healthy", "warn": "Warnings", "fail": "Failed", "not_logged": "Not logged"}
 GRADES: Mapping[str, Mark] = {"info": Mark("plain", "info"), "warn": Mark("warn", "warn"), "fail": Mark("bad", "fail")}
 MOST_LISTED = 40
+LONGEST_WHOLE = 1e10  # a parameter of 32 bits has ten digits
 
 
 def health(results: FlightResults) -> Section | None:
@@ -39,7 +40,8 @@ def health(results: FlightResults) -> Section | None:
     parts += [] if listed is None else [listed]
     others = [Figure("health.panels", one.key) for one in told if one.key not in shown]
     rest = _happenings([one for one in answer.happenings if one.grade == "info"], "Modes and remarks logged")
-    appendix = (*others, *([] if rest is None else [rest]), _measures(answer), _basis(answer))
+    settings = [part for part in (_found(answer), _differing(answer)) if part is not None]
+    appendix = (*others, *([] if rest is None else [rest]), _measures(answer), *settings, _basis(answer))
     headline = typeset(answer.sentence)
     return Section("health", TITLE, LEAD, tuple(parts), headline, claim=_claim(answer), appendix=appendix)
 
@@ -128,6 +130,49 @@ def _happenings(happenings: Sequence[Happening], title: str) -> Grid | None:
     return Grid(title, (Head("Time"), Head("Grade"), Head("What"), Head("In the air")), rows, more)
 
 
+def _found(answer: AutopilotHealth) -> Grid | None:
+    """Return the settings beside what the flight shows."""
+    if not answer.settings_found:
+        return None
+    heads = (
+        *(Head("Setting"), Head("Parameter"), Head("Set", True), Head("Found", True), Head("Sigma", True)),
+        *(Head("Verdict"), Head("Basis, or why not")),
+    )
+    rows = [
+        (
+            one.what,
+            one.name,
+            f"{significant(one.stated)} {sign_of(one.unit)}".strip(),
+            ABSENT if one.found is None else f"{significant(one.found)} {sign_of(one.unit)}".strip(),
+            ABSENT if one.sigma is None else significant(one.sigma),
+            Mark(TONES[one.verdict], WORDS[one.verdict]),
+            typeset(one.reason),
+        )
+        for one in answer.settings_found
+    ]
+    return Grid("Settings against what was found", heads, rows)
+
+
+def _as_set(value: float) -> str:
+    """Return a parameter as it is set: single precision, whole numbers in full."""
+    return f"{value:.0f}" if value == round(value) and abs(value) < LONGEST_WHOLE else f"{value:.7g}"
+
+
+def _differing(answer: AutopilotHealth) -> Grid | Note | None:
+    """Return the parameters off their defaults; a note where the log tells no defaults."""
+    if not answer.parameters_logged:
+        return None
+    if not answer.has_defaults:
+        text = (
+            f"Parameters off their defaults: not logged. The log has {number(answer.parameters_logged, 0)} parameters"
+        )
+        return Note(f"{text} and none of their defaults.", "unknown")
+    rows = [(one.name, _as_set(one.value), _as_set(one.default)) for one in answer.differing]
+    caption = f"{number(len(rows), 0)} of {number(answer.parameters_logged, 0)} parameters, by the log's own defaults."
+    heads = (Head("Parameter"), Head("Value", True), Head("Default", True))
+    return Grid("Parameters off their defaults", heads, rows, caption)
+
+
 def _measures(answer: AutopilotHealth) -> Grid:
     heads = (
         *(Head("Quantity"), Head("Verdict"), Head("Worst", True), Head("At", True), Head("Median", True)),
@@ -153,6 +198,7 @@ def _measures(answer: AutopilotHealth) -> Grid:
 def _basis(answer: AutopilotHealth) -> Facts:
     pairs = [
         ("Autopilot", answer.autopilot, ""),
+        *([("Estimator that flew it", answer.estimator, typeset(answer.estimator_source))] if answer.estimator else []),
         ("Judged", answer.judged_over, typeset(answer.judged_by)),
         ("Time judged", clock(answer.judged_s), "min:s"),
     ]

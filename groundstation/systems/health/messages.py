@@ -11,12 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 from groundstation.base.ardupilot_codes import (
-    BAD_MODE_REASONS,
     EVENTS,
-    GRAVE_SUBSYSTEMS,
+    LANES,
     MODE_REASONS,
     MODES,
     error_name,
+    error_severity,
+    event_severity,
+    mode_severity,
 )
 from groundstation.base.findings import Finding
 from groundstation.base.log_levels import severity_of_level, severity_of_text
@@ -28,7 +30,6 @@ from groundstation.tables.table import Flight, Table
 ULOG_TEXT, DATAFLASH_TEXT, MAVLINK_TEXT = "raw.ulog.text", "raw.MSG", "raw.STATUSTEXT"
 _COLOURS, _MODULE = re.compile("\x1b\\[[0-9;]*m"), re.compile(r"^\[\w+\]\s+(?=\S)")
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
-_GRAVE_EVENTS, _LIGHT_EVENTS = (19, 51, 54), (34, 35, 59, 60, 62)  # EV that are a failure, and a warning
 _ESTIMATOR_EVENTS = (60, 62)
 _SWITCH_EVENTS = (67, 90)
 _OF_CHECK = (
@@ -37,7 +38,6 @@ _OF_CHECK = (
     ("gnss", re.compile(r"\b(?:gps|gnss)\b.*(?:glitch|lost|no fix|jamm|spoof|unhealthy)", re.I)),
     ("battery", re.compile(r"battery", re.I)),
 )
-LANE_SWITCH = 24
 MOST_TOLD = 12  # kinds of messages that are a finding each
 
 
@@ -121,23 +121,10 @@ def _errors(flight: Flight) -> Iterator[Event]:
     ):
         if not (np.isfinite(subsystem) and np.isfinite(code)):
             continue
-        is_switch = int(subsystem) == LANE_SWITCH
-        grade: Grade = "warn" if is_switch else error_grade(int(subsystem), int(code))
+        is_switch = int(subsystem) == LANES
+        grade = error_severity(int(subsystem), int(code))
         text = error_name(int(subsystem), int(code))
         yield Event("switches" if is_switch else "faults", time_ns, grade, text, "raw.ERR")
-
-
-def error_grade(subsystem: int, code: int) -> Grade:
-    """Return the grade of an error code: information where it says that an error is over.
-
-    Examples
-    --------
-    >>> error_grade(6, 1), error_grade(6, 0), error_grade(11, 2)
-    ('fail', 'info', 'warn')
-    """
-    if code == 0 and subsystem != LANE_SWITCH:
-        return "info"
-    return "fail" if subsystem in GRAVE_SUBSYSTEMS else "warn"
 
 
 def _plain_events(flight: Flight) -> Iterator[Event]:
@@ -148,10 +135,8 @@ def _plain_events(flight: Flight) -> Iterator[Event]:
         if not np.isfinite(number):
             continue
         kind = int(number)
-        grade: Grade = "fail" if kind in _GRAVE_EVENTS else "warn" if kind in _LIGHT_EVENTS else "info"
         check = "resets" if kind in _ESTIMATOR_EVENTS else "switches" if kind in _SWITCH_EVENTS else "faults"
-        grade = "warn" if kind in _SWITCH_EVENTS else grade
-        yield Event(check, time_ns, grade, EVENTS.get(kind, f"event {kind}"), "raw.EV")
+        yield Event(check, time_ns, event_severity(kind), EVENTS.get(kind, f"event {kind}"), "raw.EV")
 
 
 def _modes(flight: Flight) -> Iterator[Event]:
@@ -170,7 +155,7 @@ def _modes(flight: Flight) -> Iterator[Event]:
         known = int(why) if np.isfinite(why) else -1
         told = f", reason: {MODE_REASONS[known]}" if known in MODE_REASONS else ""
         name = names.get(int(mode), f"{mode:.0f}")
-        grade: Grade = "fail" if known in BAD_MODE_REASONS else "info"
+        grade = mode_severity(known)
         yield Event("modes" if grade == "info" else "faults", time_ns, grade, f"mode {name}{told}", "raw.MODE")
 
 

@@ -83,7 +83,8 @@ def _events(recorder: Recorder, flight: Flight) -> None:
         said = np.flatnonzero(names != "")
         if said.size:
             texts = [f"{topic_label(topic)}: {name}" for name in names[said].tolist()]
-            recorder.texts("log/events", events.time_ns[said], texts, ["info"] * len(texts))
+            grades = [grade if grade in SEVERITIES else "info" for grade in events.text("severity")[said].tolist()]
+            recorder.texts("log/events", events.time_ns[said], texts, grades)
 
 
 def _gaps(recorder: Recorder, results: FlightResults) -> bool:
