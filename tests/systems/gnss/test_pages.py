@@ -13,9 +13,9 @@ from groundstation.systems.gnss.answer import GnssReception
 from groundstation.systems.gnss.chapter import gnss
 from groundstation.systems.gnss.plots import PLOTS
 from groundstation.tables.table import Table
-from tests.gnss.receiver_flight import answer, table, times
 from tests.real_logs import real_log
 from tests.report_example import example
+from tests.systems.gnss.made import answer, table, times
 
 
 def results_of(*tables: Table) -> FlightResults:

@@ -9,8 +9,8 @@ import pytest
 from groundstation.readers.bags.canonical import navsatfix
 from groundstation.readers.tlog.canonical import gnss as of_mavlink
 from groundstation.readers.ulog.canonical import gnss as of_px4
-from tests.receiver_writer import nmea, pvt, ubx_frame, week_ms
-from tests.test_receiver import NOON, Read
+from tests.readers.receiver_writer import nmea, pvt, ubx_frame, week_ms
+from tests.readers.test_receiver import NOON, Read
 
 CODE_NAV_SAT, CODE_RAWX = 0x0135, 0x0215
 
