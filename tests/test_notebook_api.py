@@ -44,7 +44,8 @@ NAMES = (
     "magnetic-deviation magnetic-held-out magnetic-track magnetic-branches magnetic-modulus magnetic-ground "
     "landing-deviations landing-final landing-motion landing-protection map profile attitude states gaps reference "
     "reference-track reference-claims cooperative-map cooperative-errors cooperative-geometry cooperative-links "
-    "control-paths control-measures control-law placement-map placement-accuracy"
+    "control-paths control-measures control-law placement-map placement-accuracy "
+    "gnss-states gnss-quality gnss-standstill gnss-steps gnss-pair"
 )
 
 

@@ -9,9 +9,9 @@ from groundstation.base.toml_settings import check_ranges, number
 class GnssSettings:
     """Limits of the GNSS reception.
 
-    Satellites and HDOP are judged by the share of time beyond a limit. Source of their limits: ArduPilot,
-    Tools/LogAnalyzer/tests/TestGPSGlitch.py (2026-11): satellites below 6 warn and below 5 fail, HDOP above 3 warns
-    and above 10 fails.
+    Satellites and HDOP are judged by the share of time beyond a limit. Source of their limits: ArduPilot, commit
+    0080bec (read on 2026-11-26), Tools/LogAnalyzer/tests/TestGPSGlitch.py: the least number of satellites below 6
+    warns and below 5 fails, the largest HDOP above 3 warns and above 10 fails.
     """
 
     gap_steps: float = number(3.0, 1.5, 100.0)  # a step longer than so many usual ones is a gap

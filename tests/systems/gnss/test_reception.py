@@ -9,9 +9,9 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
 from groundstation.systems.gnss.examine import shortfalls_of
 from groundstation.systems.gnss.settings import GnssSettings
-from groundstation.tables.phases import Interval, Phases
+from groundstation.tables.phases import PhaseInterval, Phases
 from groundstation.tables.table import Flight
-from tests.gnss.receiver_flight import (
+from tests.systems.gnss.made import (
     STANDS_S,
     STEP_S,
     WHOLE_S,
@@ -194,7 +194,7 @@ def test_the_step_of_logged_places_hides_scatter() -> None:
 
 
 def test_in_the_air_nothing_stands() -> None:
-    phases = Phases((Interval(0.0, WHOLE_S, "airborne"),), "test")
+    phases = Phases((PhaseInterval(0.0, WHOLE_S, "airborne"),), "test")
     assert reception(table(times(), place_m=noisy(0.02)), phases=phases).answer.receiver.standstill is None
 
 

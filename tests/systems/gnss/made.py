@@ -11,7 +11,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.systems.gnss.answer import GnssReceiver, GnssReception
 from groundstation.systems.gnss.estimate import Reception, reception_of
 from groundstation.systems.gnss.settings import GnssSettings
-from groundstation.tables.phases import Interval, Phases
+from groundstation.tables.phases import PhaseInterval, Phases
 from groundstation.tables.table import Flight, Table
 
 LATITUDE_DEG, LONGITUDE_DEG, EARTH_M = 55.0, 37.0, 6_378_137.0
@@ -83,7 +83,7 @@ def flight(*tables: Table) -> Flight:
 
 def unknown_phases(whole_s: float = WHOLE_S) -> Phases:
     """Phases of a flight of which nothing is known."""
-    return Phases((Interval(0.0, whole_s, "unknown"),), "none")
+    return Phases((PhaseInterval(0.0, whole_s, "unknown"),), "none")
 
 
 def reception(*tables: Table, phases: Phases | None = None, **settings: Any) -> Reception:

@@ -1,0 +1,101 @@
+"""Chapter, figures, columns and findings of the GNSS reception; and recorded logs with what is known of them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from groundstation.chapters.markdown import markdown
+from groundstation.pipeline.api import open_flight
+from groundstation.results.flight import FlightResults
+from groundstation.systems.gnss.analysis import GNSS
+from groundstation.systems.gnss.answer import GnssReception
+from groundstation.systems.gnss.chapter import gnss
+from groundstation.systems.gnss.plots import PLOTS
+from groundstation.tables.table import Table
+from tests.real_logs import real_log
+from tests.report_example import example
+from tests.systems.gnss.made import answer, table, times
+
+
+def results_of(*tables: Table) -> FlightResults:
+    """Results of a flight that has only this answer."""
+    found = answer(*tables)
+    bare = replace(example(), answers={"gnss": found}, figures=found.figures)
+    assert bare.answer(GnssReception) is not None
+    return bare
+
+
+def test_the_chapter_says_the_sentence_and_not_logged() -> None:
+    results = results_of(table(times(), cn0_dbhz=None))
+    section = gnss(results)
+    assert section is not None and section.claim is not None
+    text = markdown(section)
+    assert section.headline.startswith("single (3D) throughout, nothing lost; 12 satellites")
+    assert "not logged" in text and section.claim.mark.text == "Good"
+
+
+def test_a_chapter_of_nothing_known_is_not_judged() -> None:
+    section = gnss(results_of(table(times(), fix=None, satellites_used=None, hdop=None)))
+    assert section is not None and section.claim is not None and section.claim.mark.tone == "unknown"
+
+
+def test_every_figure_has_its_plot() -> None:
+    time_s = times()
+    cn0 = 40.0 + np.sin(time_s)
+    rng = np.random.default_rng(4)
+    one = table(time_s, "gnss.1", cn0_dbhz=cn0, horizontal_sigma_m=np.full(len(time_s), 0.02))
+    shaken = {name: one.values(name) + rng.normal(0.0, 2e-7, len(time_s)) for name in ("latitude_deg", "longitude_deg")}
+    results = results_of(table(time_s, "gnss.1", cn0_dbhz=cn0, **shaken), table(time_s, "gnss.2"))
+    assert PLOTS["gnss.states"](results) is not None
+    for name in ("gnss.quality", "gnss.standstill", "gnss.steps"):
+        plot = PLOTS[name](results, "gnss.1")
+        assert plot is not None and plot.title.endswith(" of gnss.1"), name
+    assert PLOTS["gnss.pair"](results, "gnss.2 from gnss.1") is not None
+    assert PLOTS["gnss.standstill"](results, "gnss.2") is None, "places that the receiver holds"
+
+
+def test_columns_of_the_tables_of_flights() -> None:
+    values = GNSS.values({"gnss": answer(table(times(), fix=np.full(len(times()), "rtk_fixed")))})
+    assert values["gnss_grade"] == "good" and values["gnss_rtk_fixed_share"] == pytest.approx(1.0)
+    assert values["gnss_satellites"] == 12.0 and values["gnss_cn0_dbhz"] is None and values["gnss_jumps"] == 0
+
+
+EXPECTED = {
+    "gnss/walk_0827_gnss_1730.ubx": ("warn", "RTK fixed 65 %, RTK float 35 %, nothing lost; 25 satellites"),
+    "gnss/walk_0827_gnss_1730_sf.pos": ("warn", "RTK fixed 65 %, RTK float 35 %, nothing lost; 25 satellites"),
+    "gnss/drive_0708_gnss_1934_sf.pos": ("good", "RTK fixed 99.6 %, RTK float 0.4 %, nothing lost; 23 satellites"),
+    "ulog/quadrotor_local.ulg": ("bad", "GNSS never had a fix: 926 rows, 0 satellites"),
+    "cases/u3_first_receiver_dead.ulg": (
+        "warn",
+        "gnss.2: single (3D) throughout, nothing lost; 14 satellites; gnss.1: ",
+    ),
+    "cases/m3_zero_fix.mcap": ("warn", "first fix after 30 s, then single (3D) throughout, nothing lost"),
+    "cases/f_zero_fix_first_60s.csv.gz": ("unknown", "first fix after 60 s, then fix (kind not logged) throughout"),
+    "cases/n4_pashr_kinds.nmea": ("good", "RTK fixed throughout, nothing lost; 14 satellites"),
+    "cases/m2_two_publishers.mcap": ("good", "gnss.1: single (3D) throughout, nothing lost"),
+    "cases/d12_hdop_9_9.bin": ("bad", "single (3D) throughout, nothing lost; 4 satellites"),
+    "gnss/inertialsense_Serial38400.nmea": ("good", "single (3D) throughout, nothing lost; 10 satellites; scatter"),
+    "gnss/pygpsdata-NMEA.log": ("warn", "single (3D); 6 satellites"),
+}
+
+
+@pytest.mark.real_log
+@pytest.mark.parametrize("name", EXPECTED)
+def test_recorded_logs_open_on_the_sentence_of_their_owner(name: str) -> None:
+    found = open_flight(real_log(name)).results.answer(GnssReception)
+    grade, sentence = EXPECTED[name]
+    assert found is not None and found.sentence.startswith(sentence) and found.grade == grade
+
+
+@pytest.mark.real_log
+def test_states_of_the_walk_and_the_drive_are_those_of_their_rows() -> None:
+    walk = open_flight(real_log("gnss/walk_0827_gnss_1730_sf.pos")).results.answer(GnssReception)
+    assert walk is not None and walk.receiver.rate_hz == pytest.approx(4.0)
+    seconds = {one.state: one.seconds for one in walk.receiver.states}
+    assert seconds == pytest.approx({"rtk_fixed": 349 / 4, "rtk_float": 187 / 4}, abs=0.01)
+    drive = open_flight(real_log("gnss/drive_0708_gnss_1934_sf.pos")).results.answer(GnssReception)
+    assert drive is not None
+    seconds = {one.state: one.seconds for one in drive.receiver.states}
+    assert seconds == pytest.approx({"rtk_fixed": 2189 / 4, "rtk_float": 8 / 4}, abs=0.01)
+    assert drive.receiver.motion is not None and drive.receiver.motion.lag_s == pytest.approx(0.126, abs=0.005)
