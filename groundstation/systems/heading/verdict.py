@@ -14,6 +14,7 @@ from groundstation.results.rules import Rejudged
 from groundstation.systems.heading.answer import HeadingResult, HeadingStep, Standstill, Verdict
 from groundstation.systems.heading.checks import Disagreement, VarianceRatio
 from groundstation.systems.heading.normality import Normality, normality_limits
+from groundstation.systems.heading.reason_answer import ALL_PASSED, BETWEEN, ENTER, IF_ENOUGH, NOT_ENTERED, good_to
 from groundstation.systems.heading.settings import HeadingSettings
 from groundstation.systems.heading.wording import told
 
@@ -413,11 +414,9 @@ def explain(
 
     A number not to be entered says so.
     """
+    number = f"{round_to_step(-error_deg, step_deg):+g} deg"
     if verdict == "accept":
-        return f"every required gate passed: enter {round_to_step(-error_deg, step_deg):+g} deg"
+        return f"{ALL_PASSED}{ENTER}{number}"
     if verdict == "advisory":
-        return (
-            f"good to +-{half_width_deg * ARCMIN_PER_DEG:.0f} arcmin; {CURES}. "
-            f"To be entered only where that is enough: {round_to_step(-error_deg, step_deg):+g} deg"
-        )
-    return f"{told(gates)}. Not to be entered: {round_to_step(-error_deg, step_deg):+g} deg"
+        return f"{good_to(half_width_deg * ARCMIN_PER_DEG)}{BETWEEN}{CURES}{IF_ENOUGH}{number}"
+    return f"{told(gates)}{NOT_ENTERED}{number}"

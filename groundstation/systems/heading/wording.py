@@ -4,6 +4,7 @@ What people can see for themselves comes first.
 """
 
 from groundstation.results.gates import Gate
+from groundstation.systems.heading.reason_answer import BETWEEN
 
 # By the name of a gate, in the order they are told. {value}: what was found; {limit}: what is needed.
 FAILED = {
@@ -54,7 +55,7 @@ def told(gates: tuple[Gate, ...]) -> str:
     """
     order = list(FAILED)
     ranked = sorted(gates, key=lambda gate: order.index(gate.name) if gate.name in order else len(order))
-    return "; ".join(_told(gate) for gate in ranked)
+    return BETWEEN.join(_told(gate) for gate in ranked)
 
 
 def _told(gate: Gate) -> str:
