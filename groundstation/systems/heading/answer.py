@@ -16,6 +16,7 @@ from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
 from groundstation.results.roles import HeadingByTrack, IntervalPart, LatencyByTurns, OnTaxi
 from groundstation.systems.heading.arrays import HeadingSamples
+from groundstation.systems.heading.gates_answer import NOT_IN_INTERVAL
 
 Verdict = Literal["accept", "advisory", "reject", "extend", "undecided"]
 
@@ -256,6 +257,15 @@ class HeadingResult(Answer, OnTaxi, HeadingByTrack, LatencyByTurns):
         if self.platform_error_deg is None or self.platform_standard_error_deg is None:
             return self.error_deg, self.standard_error_deg
         return self.platform_error_deg, self.platform_standard_error_deg
+
+    @property
+    def failed_beside_interval(self) -> tuple[str, ...]:
+        """Names of the gates that refuse a use of the error."""
+        return tuple(
+            gate.name
+            for gate in self.gates
+            if gate.required and gate.state == "failed" and gate.name in NOT_IN_INTERVAL
+        )
 
     @property
     def taxi_used_s(self) -> tuple[tuple[float, float], ...]:

@@ -7,6 +7,7 @@ from groundstation.chapters.gates import VERDICTS, failed_to_inform
 from groundstation.chapters.parts import Claim, Rank
 from groundstation.chapters.wording import ABSENT, interval, is_number, number, step_places, typeset, with_full_stop
 from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.heading.gates_answer import LEAVES_OPEN
 from groundstation.systems.heading.reason_answer import why_alone
 
 PUBLISHED_LIMIT_ARCMIN = 20.0
@@ -16,7 +17,6 @@ SAME_EVERYWHERE = (
     "even there and back."
 )
 UNEVEN_POWER = "Uneven power is stated: what it may add is in the interval, under installation."
-OPEN = ("before_take_off", "taxi_seconds")  # gates without which a verdict decides nothing about a flight
 ADVICE: Mapping[str, str] = {
     "reject": "Enter no correction",
     "extend": "No correction yet: measure longer",
@@ -26,7 +26,7 @@ ADVICE: Mapping[str, str] = {
 
 def claim(heading: HeadingResult) -> Claim:
     """Return the verdict with the number to type, or why there is none."""
-    is_open = any(gate.name in OPEN and gate.state == "failed" for gate in heading.gates)
+    is_open = any(gate.name in LEAVES_OPEN and gate.state == "failed" for gate in heading.gates)
     return Claim(
         Rank.HEADING_OPEN if heading.verdict == "undecided" or is_open else Rank.HEADING,
         VERDICTS[heading.verdict],

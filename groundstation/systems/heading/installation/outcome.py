@@ -12,11 +12,12 @@ from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.methods.intervals import mixture_quantile
 from groundstation.results.installations import Lesson
 from groundstation.results.roles import IntervalPart
+from groundstation.systems.heading.gates_answer import WHOLE
 from groundstation.systems.heading.installation.answer import InstallationResult
 from groundstation.systems.heading.installation.model import Belief, Mixture, doubts, installed, predict
 from groundstation.systems.heading.installation.settings import InstallationSettings
 from groundstation.systems.heading.reason_answer import ALL_PASSED, ENTER, good_to
-from groundstation.systems.heading.verdict import WHOLE, is_mostly_steady, round_to_step
+from groundstation.systems.heading.verdict import is_mostly_steady, round_to_step
 
 FloatArray = NDArray[np.float64]
 AIRFRAME, PLATFORM = 0, 1
