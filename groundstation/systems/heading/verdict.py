@@ -32,22 +32,26 @@ CURES = "taxi the other way, state the wind, or let the tool learn the installat
 
 
 @dataclass(frozen=True)
-class Figures:
-    """Figures that the gates judge. None: could not be measured."""
+class JudgedValues:
+    """Values that the gates judge, beside those of the samples. None: could not be measured.
 
-    precision_deg: float
-    quality_deg: float
-    half_width_deg: float
-    whole_half_width_deg: float
-    steady_sigma_deg: float
+    ``half_width_deg`` is that of the interval from this taxi alone, ``whole_half_width_deg`` that with the steady
+    terms, whose sigma is ``steady_sigma_deg``.
+    """
+
     taxi_seconds: float
-    normality: Normality | None
-    variance: VarianceRatio | None
-    drift_deg_per_h: float | None
-    drift_sigma_deg_per_h: float | None
-    mode_changes: int | None
-    disagreement: Disagreement | None
-    steps: tuple[HeadingStep, ...]
+    precision_deg: float | None = None
+    quality_deg: float | None = None
+    half_width_deg: float | None = None
+    whole_half_width_deg: float | None = None
+    steady_sigma_deg: float | None = None
+    normality: Normality | None = None
+    variance: VarianceRatio | None = None
+    drift_deg_per_h: float | None = None
+    drift_sigma_deg_per_h: float | None = None
+    mode_changes: int | None = None
+    disagreement: Disagreement | None = None
+    steps: tuple[HeadingStep, ...] = ()
     held_s: float | None = None
 
 
@@ -119,7 +123,7 @@ class _Judge:
 
 
 def build_gates(
-    samples: TaxiSamples, standstill: Standstill | None, figures: Figures, settings: HeadingSettings
+    samples: TaxiSamples, standstill: Standstill | None, values: JudgedValues, settings: HeadingSettings
 ) -> tuple[Gate, ...]:
     """Build every gate of the method in the order of the paper.
 
@@ -129,17 +133,17 @@ def build_gates(
     bounds = gate_bounds(settings, int(samples.is_used.sum()), rate_hz)
     judge = _Judge(bounds, _required_by(settings))
     return (
-        *_throughout_gates(samples, figures, settings, judge),
+        *_throughout_gates(samples, values, settings, judge),
         *_standstill_gates(standstill, judge),
         *_taxi_gates(samples, settings, judge),
-        *_accuracy_gates(samples, figures, judge),
-        *_normality_gates(figures.normality, judge),
-        *_steadiness_gates(figures, judge),
+        *_accuracy_gates(samples, values, judge),
+        *_normality_gates(values.normality, judge),
+        *_steadiness_gates(values, judge),
     )
 
 
 def _throughout_gates(
-    samples: TaxiSamples, figures: Figures, settings: HeadingSettings, judge: _Judge
+    samples: TaxiSamples, values: JudgedValues, settings: HeadingSettings, judge: _Judge
 ) -> tuple[Gate, ...]:
     judged = is_straight_and_fast(samples, settings) & np.isin(
         samples.gate, ["used", "geometry", "integrity", "outlier"]
@@ -151,7 +155,7 @@ def _throughout_gates(
     geometry = geometry * (most / settings.geometry_max)  # samples store a velocity sigma scaled to it: back to m/s
     limit = f"at most {most:g} m/s" if is_sigma else f"at most {most:g}"
     name = f"{VELOCITY_SIGMA} of the receiver" if is_sigma else samples.geometry_name or "GDOP"
-    changes = figures.mode_changes
+    changes = values.mode_changes
     return (
         judge(
             "geometry",
@@ -209,36 +213,37 @@ def _taxi_gates(samples: TaxiSamples, settings: HeadingSettings, judge: _Judge) 
     )
 
 
-def _accuracy_gates(samples: TaxiSamples, figures: Figures, judge: _Judge) -> tuple[Gate, ...]:
+def _accuracy_gates(samples: TaxiSamples, values: JudgedValues, judge: _Judge) -> tuple[Gate, ...]:
     """Judge how much taxi there is, and how well it shows the error."""
     outliers, used = int(np.sum(samples.gate == "outlier")), int(samples.is_used.sum())
-    of_steady_terms = f"{NORMAL_95 * figures.steady_sigma_deg:.2f} deg of it wind and installation"
+    steady_deg = values.steady_sigma_deg
+    of_steady_terms = "" if steady_deg is None else f"{NORMAL_95 * steady_deg:.2f} deg of it wind and installation"
     return (
-        judge("taxi_seconds", figures.taxi_seconds),
+        judge("taxi_seconds", values.taxi_seconds),
         judge("outliers", outliers / max(outliers + used, 1), f"{outliers} of {outliers + used}"),
-        judge("held_velocity", figures.held_s, "no turn in motion" if figures.held_s is None else ""),
+        judge("held_velocity", values.held_s, "no turn in motion" if values.held_s is None else ""),
         judge("gnss_rate", 1.0 / samples.interval_s if samples.interval_s > 0 else None),
-        judge("precision", figures.precision_deg),
-        judge("quality", figures.quality_deg),
-        judge(TAXI_ALONE, figures.half_width_deg),
-        judge(WHOLE, figures.whole_half_width_deg, of_steady_terms),
+        judge("precision", values.precision_deg),
+        judge("quality", values.quality_deg),
+        judge(TAXI_ALONE, values.half_width_deg),
+        judge(WHOLE, values.whole_half_width_deg, of_steady_terms),
     )
 
 
 def _normality_gates(normal: Normality | None, judge: _Judge) -> tuple[Gate, ...]:
     if normal is None:
         return tuple(judge(name, None, "too few samples, or no spread") for name in OF_NORMALITY)
-    values = abs(normal.skewness), normal.excess_kurtosis, normal.distance
+    measures = abs(normal.skewness), normal.excess_kurtosis, normal.distance
     chances = normal.skewness_p, normal.kurtosis_p, normal.distance_p
     return tuple(
         judge(name, value, f"p = {chance:.2g} for independent samples, not gated")
-        for name, value, chance in zip(OF_NORMALITY, values, chances, strict=True)
+        for name, value, chance in zip(OF_NORMALITY, measures, chances, strict=True)
     )
 
 
-def _steadiness_gates(figures: Figures, judge: _Judge) -> tuple[Gate, ...]:
-    variance, parts = figures.variance, figures.disagreement
-    drift, sigma = figures.drift_deg_per_h, figures.drift_sigma_deg_per_h
+def _steadiness_gates(values: JudgedValues, judge: _Judge) -> tuple[Gate, ...]:
+    variance, parts = values.variance, values.disagreement
+    drift, sigma = values.drift_deg_per_h, values.drift_sigma_deg_per_h
     return (
         judge(
             "variance_ratio",
@@ -260,8 +265,8 @@ def _steadiness_gates(figures: Figures, judge: _Judge) -> tuple[Gate, ...]:
         ),
         judge(
             "steps",
-            float(len(figures.steps)),
-            ", ".join(f"{step.size_deg:+.2f} deg at {step.time_s:.1f} s" for step in figures.steps),
+            float(len(values.steps)),
+            ", ".join(f"{step.size_deg:+.2f} deg at {step.time_s:.1f} s" for step in values.steps),
         ),
     )
 
@@ -274,7 +279,7 @@ def _is_curable(gate: Gate, standstill: Standstill | None, settings: HeadingSett
     return gate.name == STANDSTILL_SPEED and is_short
 
 
-def is_mostly_steady(whole_deg: float, alone_deg: float) -> bool:
+def is_mostly_steady(whole_half_width_deg: float, alone_half_width_deg: float) -> bool:
     """Tell whether wind and installation make more of the interval than this taxi.
 
     Examples
@@ -282,7 +287,7 @@ def is_mostly_steady(whole_deg: float, alone_deg: float) -> bool:
     >>> is_mostly_steady(0.3, 0.2), is_mostly_steady(0.3, 0.25)
     (True, False)
     """
-    return whole_deg**2 >= 2.0 * alone_deg**2
+    return whole_half_width_deg**2 >= 2.0 * alone_half_width_deg**2
 
 
 def _lacks_steady_parts(gates: tuple[Gate, ...]) -> bool:
