@@ -10,13 +10,7 @@ from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.gates_answer import GATES
 
 PURPOSE = "heading correction"
-TAXI = "taxi straight above 6 m/s for 20 s before take-off"
-REMEDIES: Remedies = (
-    ("ground speed never above", ("Fly", TAXI)),
-    ("needed for an estimate", ("Fly", TAXI)),
-    ("no straight taxi", ("Fly", TAXI)),
-    ("ground contact proven", ("Record", "weight on wheels")),
-)
+STANDSTILL_S = 30.0
 NO_GROUND_RUN = ("ground speed never above", "no straight taxi", NO_CONTACT)
 WHAT_IT_NEEDS = (
     "The method needs a straight run on the ground at taxi speed, where the nose points along the motion, with ground "
@@ -24,20 +18,35 @@ WHAT_IT_NEEDS = (
 )
 
 
+def remedies(taxi_speed_min_mps: float, taxi_min_s: float) -> Remedies:
+    """Return what mends a missing answer; with shipped settings, since it is the answer that keeps its own."""
+    taxi = f"taxi straight above {taxi_speed_min_mps:g} m/s for {taxi_min_s:g} s before take-off"
+    return (
+        ("ground speed never above", ("Fly", taxi)),
+        ("needed for an estimate", ("Fly", taxi)),
+        ("no straight taxi", ("Fly", taxi)),
+        ("ground contact proven", ("Record", "weight on wheels")),
+    )
+
+
 def advise(results: FlightResults) -> Iterator[Advice]:
     """Yield what helps against each gate that keeps the number from being typed."""
     answer = results.answer(HeadingResult)
-    for gate in () if answer is None else answer.gates:
+    if answer is None:
+        return
+    standstill = f"{answer.setting('standstill_max_s', STANDSTILL_S):g} s"
+    for gate in answer.gates:
         if gate.state == "failed" or (gate.state == "not_measured" and gate.required):
-            yield from _against(gate)
+            yield from _against(gate, standstill)
 
 
-def _against(gate: Gate) -> Iterator[Advice]:
+def _against(gate: Gate, standstill: str) -> Iterator[Advice]:
     kind = GATES.get(gate.name)
     if kind is None or not kind.advice:
         return
     limit = gate.limit if isinstance(gate.limit, float) else None
-    text = kind.advice.format(limit=number(limit, 0, gate.unit), value=f"{significant(gate.value)} {gate.unit}")
+    value = f"{significant(gate.value)} {gate.unit}"
+    text = kind.advice.format(limit=number(limit, 0, gate.unit), value=value, standstill=standstill)
     yield Advice(kind.line, text, PURPOSE, is_pressing=True)
 
 

@@ -36,7 +36,7 @@ class GateKind:
     failed, not_measured : str
         Words for a crew. {value}: what was found; {limit}: what is needed; {reason}: that of the gate.
     line, advice : str
-        What helps against it, and under which heading it is told.
+        What helps against it, and under which heading it is told. {standstill}: the longest that is assessed.
     cured_by_more_data : bool
         Its failure asks for more data where that of another required gate rejects.
     from_data_alone : str
@@ -109,7 +109,7 @@ GATES: Mapping[str, GateKind] = {  # in the order in which a crew is told of the
             failed="stood still for {value}, {limit} needed",
             not_measured="standstill",
             line="Fly",
-            advice="stand still for 30 s before taxi",
+            advice="stand still for {standstill} before taxi",
             cured_by_more_data=True,
             from_data_alone="standstill",
             still_teaches=True,
@@ -122,7 +122,7 @@ GATES: Mapping[str, GateKind] = {  # in the order in which a crew is told of the
             failed="GNSS shows {value} at standstill, at most {limit}",
             not_measured="GNSS velocity at standstill",
             line="Fly",
-            advice="stand still for 30 s before taxi, with an open sky",
+            advice="stand still for {standstill} before taxi, with an open sky",
             from_data_alone="standstill",
             still_teaches=True,
         ),

@@ -7,6 +7,8 @@ import pytest
 
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.simulation.taxi import TaxiCase, simulate_taxi, taxi_flight
+from groundstation.systems.heading.advice_chapter import STANDSTILL_S
+from groundstation.systems.heading.answer import MEAN_SPEED_LIMIT, RAW_SPEED_LIMIT
 from groundstation.systems.heading.estimate import estimate_heading_error
 from groundstation.systems.heading.gates_answer import GATES, LIMITS
 from groundstation.systems.heading.settings import HeadingSettings
@@ -34,6 +36,12 @@ ENOUGH = 1000  # samples
 )
 def test_a_shipped_limit_is_that_of_its_source(name: str, value: float, source: str) -> None:
     assert getattr(HeadingSettings(), name) == value, source
+
+
+def test_limits_that_figures_show_without_an_answer_are_the_shipped_ones() -> None:
+    shipped = HeadingSettings()
+    for name, value in (RAW_SPEED_LIMIT, MEAN_SPEED_LIMIT, ("standstill_max_s", STANDSTILL_S)):
+        assert getattr(shipped, name) == value
 
 
 def test_the_whole_interval_may_be_as_wide_as_the_published_errors() -> None:
