@@ -143,6 +143,11 @@ class HeadingByTrack:
     settings: Mapping[str, float | str | bool]
 
     @property
+    def failed_beside_interval(self) -> tuple[str, ...]:
+        """Names of required gates that failed and whose finding ``standard_error_deg`` does not hold."""
+        raise NotImplementedError
+
+    @property
     def azimuth(self) -> tuple[float, float]:
         """Error of the platform's azimuth and its standard error, deg; the mounting taken off."""
         raise NotImplementedError

@@ -1,44 +1,16 @@
 """Advice of the heading correction: what to fly, record and check, and what it needs."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
-from groundstation.chapters.chapter import Advice, NextLine, Remedies
+from groundstation.chapters.chapter import Advice, Remedies
 from groundstation.chapters.wording import number, significant
 from groundstation.results.flight import FlightResults
 from groundstation.results.gates import NO_CONTACT, Gate, in_plain_words
 from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.heading.gates_answer import GATES
 
 PURPOSE = "heading correction"
-TAXI = "taxi straight above 6 m/s for 20 s before take-off"
-# What helps against a gate that failed or was not measured: line, advice.
-BY_GATE: Mapping[str, tuple[NextLine, str]] = {
-    "taxi_seconds": ("Fly", "taxi straight for {limit} or more before take-off"),
-    "before_take_off": ("Fly", "taxi straight before take-off: taxi after landing does not count"),
-    "half_width": ("Fly", "taxi straight for longer"),
-    "precision": ("Fly", "taxi straight for longer"),
-    "whole_half_width": (
-        "Fly",
-        "taxi the other way too, state the wind (--weather) and aircraft_class, or let the tool learn the installation",
-    ),
-    "standstill_duration": ("Fly", "stand still for 30 s before taxi"),
-    "standstill_speed_of_mean": ("Fly", "stand still for 30 s before taxi, with an open sky"),
-    "geometry": ("Record", "GDOP, PDOP or HDOP"),
-    "integrity": ("Record", "the integrity flag of GNSS"),
-    "ground": ("Record", "weight on wheels"),
-    "gnss_rate": ("Record", "GNSS velocity at 10 Hz (now {value})"),
-    "held_velocity": ("Check", "the receiver: it holds its velocity in turns (static hold, dynamic model)"),
-    "drift": ("Check", "the alignment of the INS: let it settle before taxi"),
-    "steps": ("Check", "the alignment of the INS: its heading stepped"),
-    "ins_mode": ("Check", "the alignment of the INS: it changed its mode"),
-}
-SURROUNDINGS = ("outliers", "segments", "quality", "variance_ratio", "normal_distance", "skewness", "kurtosis")
-REFLECTIONS = "the taxiway for reflections and gusts"
-REMEDIES: Remedies = (
-    ("ground speed never above", ("Fly", TAXI)),
-    ("needed for an estimate", ("Fly", TAXI)),
-    ("no straight taxi", ("Fly", TAXI)),
-    ("ground contact proven", ("Record", "weight on wheels")),
-)
+STANDSTILL_S = 30.0
 NO_GROUND_RUN = ("ground speed never above", "no straight taxi", NO_CONTACT)
 WHAT_IT_NEEDS = (
     "The method needs a straight run on the ground at taxi speed, where the nose points along the motion, with ground "
@@ -46,22 +18,36 @@ WHAT_IT_NEEDS = (
 )
 
 
+def remedies(taxi_speed_min_mps: float, taxi_min_s: float) -> Remedies:
+    """Return what mends a missing answer; with shipped settings, since it is the answer that keeps its own."""
+    taxi = f"taxi straight above {taxi_speed_min_mps:g} m/s for {taxi_min_s:g} s before take-off"
+    return (
+        ("ground speed never above", ("Fly", taxi)),
+        ("needed for an estimate", ("Fly", taxi)),
+        ("no straight taxi", ("Fly", taxi)),
+        ("ground contact proven", ("Record", "weight on wheels")),
+    )
+
+
 def advise(results: FlightResults) -> Iterator[Advice]:
     """Yield what helps against each gate that keeps the number from being typed."""
     answer = results.answer(HeadingResult)
-    for gate in () if answer is None else answer.gates:
+    if answer is None:
+        return
+    standstill = f"{answer.setting('standstill_max_s', STANDSTILL_S):g} s"
+    for gate in answer.gates:
         if gate.state == "failed" or (gate.state == "not_measured" and gate.required):
-            yield from _against(gate)
+            yield from _against(gate, standstill)
 
 
-def _against(gate: Gate) -> Iterator[Advice]:
-    if gate.name in SURROUNDINGS:
-        yield Advice("Check", REFLECTIONS, PURPOSE, is_pressing=True)
-    elif gate.name in BY_GATE:
-        line, text = BY_GATE[gate.name]
-        limit = gate.limit if isinstance(gate.limit, float) else None
-        told = text.format(limit=number(limit, 0, gate.unit), value=f"{significant(gate.value)} {gate.unit}")
-        yield Advice(line, told, PURPOSE, is_pressing=True)
+def _against(gate: Gate, standstill: str) -> Iterator[Advice]:
+    kind = GATES.get(gate.name)
+    if kind is None or not kind.advice:
+        return
+    limit = gate.limit if isinstance(gate.limit, float) else None
+    value = f"{significant(gate.value)} {gate.unit}"
+    text = kind.advice.format(limit=number(limit, 0, gate.unit), value=value, standstill=standstill)
+    yield Advice(kind.line, text, PURPOSE, is_pressing=True)
 
 
 def explained(reason: str) -> str:

@@ -13,7 +13,8 @@ from groundstation.results.rules import Rejudged
 from groundstation.systems.analysis import Analysis, Found, RejudgeAlso, RestsOn, Rules, Shortfall, main_numbers
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.columns import COLUMNS
-from groundstation.systems.heading.settings import LIMITS, HeadingRequest, HeadingSettings
+from groundstation.systems.heading.gates_answer import LIMITS
+from groundstation.systems.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.systems.known import Known
 
 if TYPE_CHECKING:

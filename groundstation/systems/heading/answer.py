@@ -16,8 +16,11 @@ from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
 from groundstation.results.roles import HeadingByTrack, IntervalPart, LatencyByTurns, OnTaxi
 from groundstation.systems.heading.arrays import HeadingSamples
+from groundstation.systems.heading.gates_answer import NOT_IN_INTERVAL
 
 Verdict = Literal["accept", "advisory", "reject", "extend", "undecided"]
+# Limits that figures show: setting, and what is shipped (a test holds them to the settings).
+RAW_SPEED_LIMIT, MEAN_SPEED_LIMIT = ("standstill_speed_max_mps", 0.2), ("speed_of_mean_max_mps", 0.01)
 
 
 @dataclass(frozen=True)
@@ -167,7 +170,7 @@ class HeadingResult(Answer, OnTaxi, HeadingByTrack, LatencyByTurns):
     estimate_sd_deg : float
         Standard deviation of the differences d about their mean.
     correction_deg : float or None
-        The number to type: minus the error, rounded to the entry step; None unless there is something to type.
+        The number to type: minus the error, rounded to the entry step; None unless the verdict is accept.
     drift_deg_per_h, drift_sigma_deg_per_h : float
     lever_arm_m, lever_arm_sigma_m, lever_arm_origin
         Longitudinal antenna arm, its sigma, and ``"aircraft file"``, ``"estimated"`` or ``"not observable"``.
@@ -256,6 +259,20 @@ class HeadingResult(Answer, OnTaxi, HeadingByTrack, LatencyByTurns):
         if self.platform_error_deg is None or self.platform_standard_error_deg is None:
             return self.error_deg, self.standard_error_deg
         return self.platform_error_deg, self.platform_standard_error_deg
+
+    def setting(self, name: str, shipped: float) -> float:
+        """Return a setting that the answer rests on, the shipped one where it keeps none of that name."""
+        value = self.settings.get(name)
+        return shipped if value is None or isinstance(value, str | bool) else value
+
+    @property
+    def failed_beside_interval(self) -> tuple[str, ...]:
+        """Names of the gates that refuse a use of the error."""
+        return tuple(
+            gate.name
+            for gate in self.gates
+            if gate.required and gate.state == "failed" and gate.name in NOT_IN_INTERVAL
+        )
 
     @property
     def taxi_used_s(self) -> tuple[tuple[float, float], ...]:

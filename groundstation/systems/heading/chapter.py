@@ -13,7 +13,13 @@ from groundstation.results.chosen import ChosenInterval
 from groundstation.results.flight import FlightResults
 from groundstation.systems.heading.advice_chapter import explained
 from groundstation.systems.heading.agreement_answer import heading_agreement
-from groundstation.systems.heading.answer import HeadingResult, OnboardComparison, Standstill, TaxiSegment
+from groundstation.systems.heading.answer import (
+    RAW_SPEED_LIMIT,
+    HeadingResult,
+    OnboardComparison,
+    Standstill,
+    TaxiSegment,
+)
 from groundstation.systems.heading.claim_chapter import PARTS, claim
 
 SOURCES = (
@@ -69,7 +75,7 @@ def heading(results: FlightResults) -> Section:
             _estimates(answer),
             _spread(answer, has_serial=has_serial),
             _geometry(answer),
-            _standstill_facts(answer.standstill),
+            _standstill_facts(answer),
         ),
         *(Figure(f"heading.{name}") for name in WORKINGS),
         *_settings(answer.settings),
@@ -178,7 +184,8 @@ def _standstill(still: Standstill | None) -> tuple[Part, ...]:
     return (Note(HELD, "unknown"),) if still is not None and still.velocity_is_held else STANDSTILL_FIGURES
 
 
-def _standstill_facts(still: Standstill | None) -> Facts | None:
+def _standstill_facts(answer: HeadingResult) -> Facts | None:
+    still = answer.standstill
     if still is None or still.velocity_is_held:
         return None
     mean = f"{_velocity(still.mean_north_mps)} / {_velocity(still.mean_east_mps)}"
@@ -197,7 +204,7 @@ def _standstill_facts(still: Standstill | None) -> Facts | None:
             number(still.mean_of_speed_mps, 4, "m/s"),
             "other reading of Markelov 2015; not gated",
         ),
-        ("Raw samples above 0.2 m/s", share, ""),
+        (f"Raw samples above {answer.setting(*RAW_SPEED_LIMIT):g} m/s", share, ""),
         ("Parts of the velocity error", _make_up(still), ""),
     )
     return Facts("GNSS at standstill", pairs)

@@ -1,6 +1,5 @@
 """Claim of the heading correction: the verdict, what to enter, why, and the figures."""
 
-import re
 from collections.abc import Mapping
 
 from groundstation.base.units import ARCMIN_PER_DEG
@@ -8,6 +7,8 @@ from groundstation.chapters.gates import VERDICTS, failed_to_inform
 from groundstation.chapters.parts import Claim, Rank
 from groundstation.chapters.wording import ABSENT, interval, is_number, number, step_places, typeset, with_full_stop
 from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.heading.gates_answer import LEAVES_OPEN
+from groundstation.systems.heading.reason_answer import why_alone
 
 PUBLISHED_LIMIT_ARCMIN = 20.0
 PARTS: Mapping[str, str] = {"taxi": "this taxi", "wind": "wind", "installation": "installation"}
@@ -16,8 +17,6 @@ SAME_EVERYWHERE = (
     "even there and back."
 )
 UNEVEN_POWER = "Uneven power is stated: what it may add is in the interval, under installation."
-GOOD_TO = "good to +-"  # what the reason of an advisory begins with; the headline says it
-OPEN = ("before_take_off", "taxi_seconds")  # gates without which a verdict decides nothing about a flight
 ADVICE: Mapping[str, str] = {
     "reject": "Enter no correction",
     "extend": "No correction yet: measure longer",
@@ -27,7 +26,7 @@ ADVICE: Mapping[str, str] = {
 
 def claim(heading: HeadingResult) -> Claim:
     """Return the verdict with the number to type, or why there is none."""
-    is_open = any(gate.name in OPEN and gate.state == "failed" for gate in heading.gates)
+    is_open = any(gate.name in LEAVES_OPEN and gate.state == "failed" for gate in heading.gates)
     return Claim(
         Rank.HEADING_OPEN if heading.verdict == "undecided" or is_open else Rank.HEADING,
         VERDICTS[heading.verdict],
@@ -62,10 +61,7 @@ def to_enter(verdict: str, correction_deg: float | None, half_width: str, step_d
 
 def reasons(heading: HeadingResult) -> tuple[str, ...]:
     """Return why the verdict is what it is, failed side checks, and the error in words."""
-    why = typeset(
-        re.split(r": enter |\. Not to be entered|\. To be entered", heading.verdict_reason)[0]
-    )  # told by the headline
-    each = [with_full_stop(part) for part in why.split("; ") if not part.startswith(typeset(GOOD_TO))]
+    each = [with_full_stop(typeset(part)) for part in why_alone(heading.verdict_reason)]  # the headline says the rest
     return tuple(filter(None, (*each, _in_words(heading), *steady_terms(heading), failed_to_inform(heading.gates))))
 
 

@@ -7,10 +7,11 @@ import numpy as np
 from groundstation.methods.taxi.samples import HEADING_AND_VELOCITY, TaxiSamples
 from groundstation.results.roles import Delays
 from groundstation.systems.analysis import Shortfall
+from groundstation.systems.heading.gates_answer import GATES
 from groundstation.systems.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.systems.heading.standstill import find_standstill
 from groundstation.systems.heading.taxi import delay_of, straight_taxi
-from groundstation.systems.heading.verdict import STANDSTILL_GATE, Figures, build_gates
+from groundstation.systems.heading.verdict import JudgedValues, build_gates
 from groundstation.systems.heading.wording import told
 from groundstation.systems.known import Known
 from groundstation.tables.headings import true_heading
@@ -18,8 +19,6 @@ from groundstation.tables.phases import ground_mask
 from groundstation.tables.sources import choose_pair
 from groundstation.tables.table import Flight
 
-STANDSTILL = ("standstill_duration", STANDSTILL_GATE)
-OF_DATA = frozenset((*STANDSTILL, "geometry", "integrity", "ground", "before_take_off", "taxi_seconds", "outliers"))
 Spans = tuple[tuple[float, float], ...]
 
 
@@ -49,11 +48,12 @@ def examine_heading(flight: Flight, known: Known, settings: HeadingSettings) -> 
     )
     standstill, taxi = find_standstill(samples, settings).answer, taxi_spans(samples)
     stood = () if standstill is None else ((standstill.start_s, standstill.end_s),)
-    gates = build_gates(samples, standstill, _unestimated(samples, taxi), settings)
+    shown: dict[str, Spans] = {"standstill": stood, "taxi": taxi}
+    gates = build_gates(samples, standstill, JudgedValues(taxi_seconds=_seconds(samples, taxi)), settings)
     return tuple(
-        Shortfall(told((gate,)), () if gate.value is None else stood if gate.name in STANDSTILL else taxi)
+        Shortfall(told((gate,)), () if gate.value is None else shown[GATES[gate.name].from_data_alone])
         for gate in gates
-        if gate.name in OF_DATA and gate.required and gate.state != "passed"
+        if GATES[gate.name].from_data_alone and gate.required and gate.state != "passed"
     )
 
 
@@ -64,8 +64,5 @@ def taxi_spans(samples: TaxiSamples) -> Spans:
     return tuple((float(samples.time_s[rows[0]]), float(samples.time_s[rows[-1]])) for rows in runs)
 
 
-def _unestimated(samples: TaxiSamples, taxi: Spans) -> Figures:
-    """Figures of the gates without those that an estimate gives."""
-    seconds = sum(end_s - start_s + samples.interval_s for start_s, end_s in taxi)
-    nan = float("nan")
-    return Figures(nan, nan, nan, nan, nan, float(seconds), None, None, None, None, None, None, ())
+def _seconds(samples: TaxiSamples, taxi: Spans) -> float:
+    return float(sum(end_s - start_s + samples.interval_s for start_s, end_s in taxi))

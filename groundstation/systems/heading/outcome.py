@@ -24,7 +24,7 @@ from groundstation.systems.heading.settings import HeadingSettings
 from groundstation.systems.heading.solution import Solution
 from groundstation.systems.heading.standstill import StandstillData
 from groundstation.systems.heading.steady import SteadyPrior
-from groundstation.systems.heading.verdict import Figures, build_gates, decide, explain, round_to_step
+from groundstation.systems.heading.verdict import JudgedValues, build_gates, decide, explain, round_to_step
 from groundstation.systems.known import AircraftData, SiteData
 from groundstation.tables.sources import said_of
 from groundstation.tables.table import Flight
@@ -32,22 +32,39 @@ from groundstation.tables.table import Flight
 
 @dataclass(frozen=True)
 class _Error:
-    """Heading error, wrapped, with the sigma of what all samples share.
+    """Heading error of the airframe, wrapped, with its intervals.
 
-    That is the declination, and the sideslip in every direction. ``whole_deg`` and ``measured_deg`` are the intervals
-    with and without steady sideslip; ``platform_deg`` is the former less the mounting, with its sigma.
-    ``common_sigma_deg``: what declination and installation add to it.
+    Parameters
+    ----------
+    error_deg, sigma_deg
+        The sigma includes ``common_sigma_deg``.
+    whole_interval_deg : (low, high)
+        With the steady terms.
+    taxi_interval_deg : (low, high)
+        Without them: what this taxi shows.
+    steady_sigma_deg
+        Sigma of the steady terms: wind, and sideslip that is the same in every direction.
+    common_sigma_deg
+        Sigma of what all samples share: declination, and sideslip that is the same in every direction.
+    platform_sigma_deg, platform_interval_deg
+        Those of the platform's error: mounting taken off, its sigma included.
+    parts
+        Parts of the whole interval.
     """
 
     error_deg: float
     sigma_deg: float
-    whole_deg: tuple[float, float]
-    measured_deg: tuple[float, float]
+    whole_interval_deg: tuple[float, float]
+    taxi_interval_deg: tuple[float, float]
     steady_sigma_deg: float
     common_sigma_deg: float
     platform_sigma_deg: float
-    platform_deg: tuple[float, float]
+    platform_interval_deg: tuple[float, float]
     parts: tuple[IntervalPart, ...]
+
+    @property
+    def whole_half_width_deg(self) -> float:
+        return 0.5 * (self.whole_interval_deg[1] - self.whole_interval_deg[0])
 
 
 def build_answer(
@@ -63,25 +80,25 @@ def build_answer(
     """Judge a solution and set it beside its references. ``topics`` are those of INS and GNSS."""
     error = _error_of(solution, steady)
     assessed = _assessed(standstill, solution.posterior)
-    figures = _judged_figures(flight, topics[0], solution, assessed, settings, error)
-    gates = build_gates(solution.samples, assessed, figures, settings)
+    values = _judged_values(flight, topics[0], solution, assessed, settings, error)
+    gates = build_gates(solution.samples, assessed, values, settings)
     verdict, deciding = decide(gates, assessed, settings)
-    step_deg = aircraft.entry_step_deg
+    step_deg, running = aircraft.entry_step_deg, solution.running
     plain = HeadingResult(
         ins_topic=topics[0],
         gnss_topic=topics[1],
         heading_source=solution.samples.heading_source,
         verdict=verdict,
-        verdict_reason=explain(verdict, deciding, error.error_deg, step_deg, figures.whole_half_width_deg),
+        verdict_reason=explain(verdict, deciding, error.error_deg, step_deg, error.whole_half_width_deg),
         error_deg=error.error_deg,
         standard_error_deg=error.sigma_deg,
-        confidence95_deg=error.whole_deg,
-        paper_error_deg=float(wrap_180(solution.running.mean_deg[-1])),
-        precision_deg=figures.precision_deg,
-        quality_deg=figures.quality_deg,
-        estimate_sd_deg=float(solution.running.sigma_deg[-1]),
+        confidence95_deg=error.whole_interval_deg,
+        paper_error_deg=float(wrap_180(running.mean_deg[-1])),
+        precision_deg=float(running.precision_deg[-1]),
+        quality_deg=float(running.quality_deg[-1]),
+        estimate_sd_deg=float(running.sigma_deg[-1]),
         samples=len(solution.used),
-        taxi_seconds=figures.taxi_seconds,
+        taxi_seconds=values.taxi_seconds,
         drift_deg_per_h=solution.drift_deg_per_h,
         drift_sigma_deg_per_h=solution.drift_sigma_deg_per_h,
         correction_deg=round_to_step(-error.error_deg, step_deg) if verdict == "accept" else None,
@@ -92,17 +109,6 @@ def build_answer(
         directions=solution.directions,
         uncorrected_error_deg=solution.uncorrected_deg,
         reference_time_s=solution.reference_time_s,
-        confidence95_measured_deg=error.measured_deg,
-        steady_sigma_deg=error.steady_sigma_deg,
-        steady_origin="aircraft file" if steady.is_stated else "shipped figures",
-        interval_parts=error.parts,
-        platform_error_deg=float(wrap_180(error.error_deg - steady.mounting_deg)),
-        platform_standard_error_deg=error.platform_sigma_deg,
-        platform_confidence95_deg=error.platform_deg,
-        wind=steady.wind,
-        aircraft_class=steady.aircraft_class,
-        sideslip_deg=solution.sideslip_deg,
-        mean_direction=solution.mean_direction,
         segment_spread_deg=solution.posterior.parameter("segment_deg"),
         wander_spread_deg=solution.posterior.parameter("wander_deg"),
         wander_s=solution.posterior.parameter("wander_s"),
@@ -111,8 +117,8 @@ def build_answer(
         figures=_figures_of(solution, standstill, settings, error.common_sigma_deg),
     )
     drift_prior_deg_per_h = drift_prior(aircraft.ins_class, said_of(flight, topics[0], "ins_class"))
-    with_arm = _with_arm(plain, solution)
-    return _with_references(with_arm, flight, solution, standstill, settings, site, drift_prior_deg_per_h)
+    result = _with_arm(_with_steady_terms(plain, error, solution, steady), solution)
+    return _with_references(result, flight, solution, standstill, settings, site, drift_prior_deg_per_h)
 
 
 def _error_of(solution: Solution, steady: SteadyPrior) -> _Error:
@@ -132,15 +138,15 @@ def _error_of(solution: Solution, steady: SteadyPrior) -> _Error:
         "installation": (steady.same_sigma_deg, NORMAL_95 * steady.same_sigma_deg),
     }
     return _Error(
-        wrapped,
-        float(np.hypot(posterior.standard_error_deg, common_deg)),
-        (low + shift, high + shift),
-        (least + shift, most + shift),
-        float(np.hypot(posterior.apart_sigma_deg, steady.same_sigma_deg)),
-        common_deg,
-        float(np.hypot(posterior.standard_error_deg, platform_sigma_deg)),
-        (ends_deg[0] + off, ends_deg[1] + off),
-        tuple(IntervalPart(name, sigma, half_width) for name, (sigma, half_width) in sigmas_deg.items()),
+        error_deg=wrapped,
+        sigma_deg=float(np.hypot(posterior.standard_error_deg, common_deg)),
+        whole_interval_deg=(low + shift, high + shift),
+        taxi_interval_deg=(least + shift, most + shift),
+        steady_sigma_deg=float(np.hypot(posterior.apart_sigma_deg, steady.same_sigma_deg)),
+        common_sigma_deg=common_deg,
+        platform_sigma_deg=float(np.hypot(posterior.standard_error_deg, platform_sigma_deg)),
+        platform_interval_deg=(ends_deg[0] + off, ends_deg[1] + off),
+        parts=tuple(IntervalPart(name, sigma, half_width) for name, (sigma, half_width) in sigmas_deg.items()),
     )
 
 
@@ -155,22 +161,22 @@ def _assessed(standstill: StandstillData, posterior: ErrorPosterior) -> Standsti
     )
 
 
-def _judged_figures(
+def _judged_values(
     flight: Flight,
     ins_topic: str,
     solution: Solution,
     assessed: Standstill | None,
     settings: HeadingSettings,
     error: _Error,
-) -> Figures:
+) -> JudgedValues:
     used, running = solution.used, solution.running
     begin_s = assessed.end_s if assessed else float(used.time_s[0])  # alignment may end while the aircraft stands
     interval_s = solution.samples.interval_s
-    return Figures(
+    return JudgedValues(
         precision_deg=float(running.precision_deg[-1]),
         quality_deg=float(running.quality_deg[-1]),
-        half_width_deg=0.5 * (error.measured_deg[1] - error.measured_deg[0]),
-        whole_half_width_deg=0.5 * (error.whole_deg[1] - error.whole_deg[0]),
+        half_width_deg=0.5 * (error.taxi_interval_deg[1] - error.taxi_interval_deg[0]),
+        whole_half_width_deg=error.whole_half_width_deg,
         steady_sigma_deg=error.steady_sigma_deg,
         taxi_seconds=float(sum(part.end_s - part.start_s + interval_s for part in solution.segments)),
         normality=normality(solution.without_wind_deg),
@@ -181,6 +187,24 @@ def _judged_figures(
         disagreement=disagreement(solution.parts, settings.disagreement_probability, solution.wind_of_parts_deg),
         steps=solution.steps,
         held_s=held_seconds(solution.samples),
+    )
+
+
+def _with_steady_terms(result: HeadingResult, error: _Error, solution: Solution, steady: SteadyPrior) -> HeadingResult:
+    """Add the parts of the interval, the platform's number and the wind that was used."""
+    return replace(
+        result,
+        confidence95_measured_deg=error.taxi_interval_deg,
+        steady_sigma_deg=error.steady_sigma_deg,
+        steady_origin="aircraft file" if steady.is_stated else "shipped figures",
+        interval_parts=error.parts,
+        platform_error_deg=float(wrap_180(error.error_deg - steady.mounting_deg)),
+        platform_standard_error_deg=error.platform_sigma_deg,
+        platform_confidence95_deg=error.platform_interval_deg,
+        wind=steady.wind,
+        aircraft_class=steady.aircraft_class,
+        sideslip_deg=solution.sideslip_deg,
+        mean_direction=solution.mean_direction,
     )
 
 

@@ -120,7 +120,7 @@ def convergence(results: FlightResults) -> Plot | None:
     marks: list[AnyMark] = []
     for values, name, role, gate in curves:
         marks.append(Curve(x=cycles, y=positive(values), role=role, name=name))
-        limit = next((value for of, value in limits.items() if gate and of.startswith(gate)), None)
+        limit = limits.get(gate)
         if is_number(limit):
             marks.append(Limit(value=limit, role=role, name=f"limit {limit:g}°"))
     last = max(float(cycles.max()), 2.0) if cycles.size else 1.0

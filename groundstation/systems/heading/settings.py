@@ -11,14 +11,6 @@ from groundstation.results.chosen import Interval
 Runs = Literal["auto", "before_take_off", "all_ground"]
 UseLatency = Literal["when_observed", "never"]
 LEAST_DRAWS = 100  # of a posterior of eleven parameters
-LIMITS = frozenset(  # settings that bound a gate and choose no data: a change of them needs no log
-    {
-        *("geometry_share_min", "integrity_share_min", "speed_of_mean_max_mps", "outlier_share_max"),
-        *("precision_max_deg", "quality_max_deg", "half_width_max_deg", "whole_half_width_max_deg"),
-        *("precision_decides", "half_width_decides", "whole_decides"),
-        *("skewness_max", "excess_kurtosis_range", "normal_distance_max", "variance_ratio_range", "drift_sigmas_max"),
-    }
-)
 
 
 @dataclass(frozen=True)

@@ -10,17 +10,21 @@ from groundstation.plots.marks import AnyMark, Band, Curve, Dots, Floats, Limit,
 from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import broken_at_gaps, finite, padded
 from groundstation.results.flight import FlightResults
-from groundstation.systems.heading.answer import HeadingResult, Standstill
+from groundstation.systems.heading.answer import MEAN_SPEED_LIMIT, RAW_SPEED_LIMIT, HeadingResult, Standstill
 from groundstation.systems.heading.arrays import StandstillMeanSpeed, StandstillVelocity
 
-RAW_LIMIT_MPS = 0.2
-MEAN_LIMIT_MPS = 0.01
 ROUND = np.linspace(0.0, 2.0 * np.pi, 73)
 
 
 def _assessed(results: FlightResults) -> Standstill | None:
     answer = results.answer(HeadingResult)
     return None if answer is None else answer.standstill
+
+
+def _limit_mps(results: FlightResults, limit: tuple[str, float]) -> float:
+    """Return a limit of speed that the answer rests on, the shipped one without an answer."""
+    answer = results.answer(HeadingResult)
+    return limit[1] if answer is None else answer.setting(*limit)
 
 
 def components(results: FlightResults) -> Plot | None:
@@ -32,10 +36,11 @@ def components(results: FlightResults) -> Plot | None:
     if data is None:
         return None
     time, inside = data.time_s, data.is_in_interval
+    limit_mps = _limit_mps(results, RAW_SPEED_LIMIT)
     north, east = data.velocity_north_mps, data.velocity_east_mps
     count = int(np.count_nonzero(inside & np.isfinite(north) & np.isfinite(east)))
     known = np.abs(finite(north[inside], east[inside]) if inside.any() else finite(north, east))
-    reach = 1.1 * max(float(known.max()) if known.size else 0.0, RAW_LIMIT_MPS)
+    reach = 1.1 * max(float(known.max()) if known.size else 0.0, limit_mps)
     window = finite(time[inside]) if inside.any() else finite(time)
     low, high = (float(window.min()), float(window.max())) if window.size else (0.0, 1.0)
     moments, *lines = broken_at_gaps(time, north, east)
@@ -47,10 +52,11 @@ def components(results: FlightResults) -> Plot | None:
     marks.append(Curve(x=moments, y=lines[1], role="gnss", name="east", emphasis="thin"))
     velocity = Axis("GNSS velocity, m/s", low=-reach, high=reach)
     over_time = Panel(marks, time_axis(*padded(low, high, 0.15, 2.0)), velocity, share=1.6)
-    plane = _plane(north[inside], east[inside], reach, _assessed(results))
+    plane = _plane(north[inside], east[inside], reach, limit_mps, _assessed(results))
+    origin = " (2 σ stated for GLONASS and GPS)" if limit_mps == RAW_SPEED_LIMIT[1] else ""
     caption = (
         f"The aircraft stands still: the GNSS velocity is its error. n = {number(count, 0)}. Right: in the plane; "
-        f"circle: {RAW_LIMIT_MPS} m/s (2 σ stated for GLONASS and GPS); cross: mean."
+        f"circle: {limit_mps:g} m/s{origin}; cross: mean."
     )
     return Plot(
         "standstill.components",
@@ -62,8 +68,8 @@ def components(results: FlightResults) -> Plot | None:
     )
 
 
-def _plane(north: Floats, east: Floats, reach: float, still: Standstill | None) -> Panel:
-    circle = RAW_LIMIT_MPS * np.column_stack([np.cos(ROUND), np.sin(ROUND)])
+def _plane(north: Floats, east: Floats, reach: float, limit_mps: float, still: Standstill | None) -> Panel:
+    circle = limit_mps * np.column_stack([np.cos(ROUND), np.sin(ROUND)])
     marks: list[AnyMark] = [
         Outlines(rings=(circle,), role="limit", dash="dashed"),
         Dots(x=east, y=north, role="answer"),
@@ -84,7 +90,7 @@ def mean_speed(results: FlightResults) -> Plot | None:
     if data is None:
         return None
     window, speed, height = data.window_s, data.speed_of_mean_mps, data.density_per_mps
-    still = _assessed(results)
+    still, limit_mps = _assessed(results), _limit_mps(results, MEAN_SPEED_LIMIT)
     measured = None if still is None else still.speed_of_mean_mps
     marks: list[AnyMark] = []
     for place, length in enumerate(sorted(set(finite(window).tolist()))):
@@ -92,7 +98,7 @@ def mean_speed(results: FlightResults) -> Plot | None:
         x, y, role = speed[rows], height[rows], series(place)
         marks.append(Band(x=x, low=np.zeros(len(x)), high=y, steps=True, role=role, emphasis="faint"))
         marks.append(Curve(x=x, y=y, steps=True, role=role, name=f"intervals of {length:g} s"))
-    marks.append(Limit(value=MEAN_LIMIT_MPS, is_upright=True, name=f"limit {MEAN_LIMIT_MPS} m/s"))
+    marks.append(Limit(value=limit_mps, is_upright=True, name=f"limit {limit_mps:g} m/s"))
     if is_number(measured):
         name = f"this interval: {number(measured, 4, 'm/s')}"
         marks.append(Limit(value=measured, is_upright=True, role="answer", dash="", name=name))
@@ -102,7 +108,7 @@ def mean_speed(results: FlightResults) -> Plot | None:
         "Density of the mean speed at standstill",
         "Mean speed over overlapping intervals. Longer averaging moves the density below the limit: if 10 s fail, "
         "measure longer instead of rejecting.",
-        "Densities of the mean speed for two interval lengths against the limit of 0.01 m/s.",
+        f"Densities of the mean speed for two interval lengths against the limit of {limit_mps:g} m/s.",
         one_panel(Panel(marks, x_axis, Axis("probability density, s/m", low=0.0)), 48.0),
         ("standstill_mean_speed",),
     )

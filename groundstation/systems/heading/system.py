@@ -70,8 +70,11 @@ def _learn() -> "LearnStep":
 def _advice() -> "Adviser":
     from groundstation.chapters.chapter import Adviser
     from groundstation.systems.heading import advice_chapter
+    from groundstation.systems.heading.settings import HeadingSettings
 
-    return Adviser(advice_chapter.REMEDIES, advice_chapter.advise)
+    shipped = HeadingSettings()
+    remedies = advice_chapter.remedies(shipped.taxi_speed_min_mps, shipped.taxi_min_s)
+    return Adviser(remedies, advice_chapter.advise)
 
 
 def _plots() -> "Mapping[str, Describe]":

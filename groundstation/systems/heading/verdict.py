@@ -13,37 +13,45 @@ from groundstation.results.gates import Bound, Gate, judged_gate
 from groundstation.results.rules import Rejudged
 from groundstation.systems.heading.answer import HeadingResult, HeadingStep, Standstill, Verdict
 from groundstation.systems.heading.checks import Disagreement, VarianceRatio
+from groundstation.systems.heading.gates_answer import (
+    CURED_BY_MORE_DATA,
+    GATES,
+    STANDSTILL_SPEED,
+    TAXI_ALONE,
+    WHOLE,
+    GateKind,
+)
 from groundstation.systems.heading.normality import Normality, normality_limits
+from groundstation.systems.heading.reason_answer import ALL_PASSED, BETWEEN, ENTER, IF_ENOUGH, NOT_ENTERED, good_to
 from groundstation.systems.heading.settings import HeadingSettings
 from groundstation.systems.heading.wording import told
 
-# Required gates whose failure more data may cure; the failure of any other required gate rejects.
-CURED_BY_MORE_DATA = frozenset({"standstill_duration", "taxi_seconds", "precision", "half_width", "whole_half_width"})
-WHOLE, TAXI_ALONE = "whole_half_width", "half_width"
 PAPER_RATE_HZ, LEAST_RATE_HZ = 10.0, 0.2
-HELD_MAX_S = 1.0  # a receiver is late by less
+OF_NORMALITY = ("skewness", "kurtosis", "normal_distance")
 CURES = "taxi the other way, state the wind, or let the tool learn the installation"
-STANDSTILL_GATE = "standstill_speed_of_mean"
-Bounds = Mapping[str, Bound]
 
 
 @dataclass(frozen=True)
-class Figures:
-    """Figures that the gates judge. None: could not be measured."""
+class JudgedValues:
+    """Values that the gates judge, beside those of the samples. None: could not be measured.
 
-    precision_deg: float
-    quality_deg: float
-    half_width_deg: float
-    whole_half_width_deg: float
-    steady_sigma_deg: float
+    ``half_width_deg`` is that of the interval from this taxi alone, ``whole_half_width_deg`` that with the steady
+    terms, whose sigma is ``steady_sigma_deg``.
+    """
+
     taxi_seconds: float
-    normality: Normality | None
-    variance: VarianceRatio | None
-    drift_deg_per_h: float | None
-    drift_sigma_deg_per_h: float | None
-    mode_changes: int | None
-    disagreement: Disagreement | None
-    steps: tuple[HeadingStep, ...]
+    precision_deg: float | None = None
+    quality_deg: float | None = None
+    half_width_deg: float | None = None
+    whole_half_width_deg: float | None = None
+    steady_sigma_deg: float | None = None
+    normality: Normality | None = None
+    variance: VarianceRatio | None = None
+    drift_deg_per_h: float | None = None
+    drift_sigma_deg_per_h: float | None = None
+    mode_changes: int | None = None
+    disagreement: Disagreement | None = None
+    steps: tuple[HeadingStep, ...] = ()
     held_s: float | None = None
 
 
@@ -55,24 +63,21 @@ def gate_bounds(settings: HeadingSettings, samples: int, rate_hz: float = PAPER_
     """
     slower = float(np.sqrt(max(PAPER_RATE_HZ / max(rate_hz, LEAST_RATE_HZ), 1.0)))
     skewness, kurtosis, distance = normality_limits(settings, max(samples, 1))
-    return {
-        "geometry": (settings.geometry_share_min, None),
-        "integrity": (settings.integrity_share_min, None),
-        "standstill_duration": (settings.standstill_min_s, None),
-        STANDSTILL_GATE: (None, settings.speed_of_mean_max_mps),
-        "standstill_bound97": (None, settings.speed_of_mean_max_mps),
-        "taxi_seconds": (settings.taxi_min_s, None),
-        "outliers": (None, settings.outlier_share_max),
+    by_the_flight: dict[str, Bound] = {
         "precision": (None, settings.precision_max_deg * slower),
-        "quality": (None, settings.quality_max_deg),
-        "half_width": (None, settings.half_width_max_deg),
-        "whole_half_width": (None, settings.whole_half_width_max_deg),
         "skewness": (None, skewness),
         "kurtosis": kurtosis,
         "normal_distance": (None, distance),
-        "variance_ratio": settings.variance_ratio_range,
-        "drift": (None, settings.drift_sigmas_max),
     }
+    return {kind.name: _as_set(kind, settings) for kind in GATES.values() if kind.setting} | by_the_flight
+
+
+def _as_set(kind: GateKind, settings: HeadingSettings) -> Bound:
+    """Return the bound of a gate as its setting states it."""
+    stated = getattr(settings, kind.setting)
+    if isinstance(stated, tuple):
+        return stated
+    return (stated, None) if kind.sense == "at_least" else (None, stated)
 
 
 def rejudge(answer: HeadingResult, settings: HeadingSettings) -> tuple[Rejudged, ...]:
@@ -91,15 +96,34 @@ def rejudge(answer: HeadingResult, settings: HeadingSettings) -> tuple[Rejudged,
 
 def _required_by(settings: HeadingSettings) -> dict[str, bool]:
     """Tell for the gates that a setting decides whether they are required."""
-    return {
-        "precision": settings.precision_decides,
-        TAXI_ALONE: settings.half_width_decides,
-        WHOLE: settings.whole_decides,
-    }
+    return {kind.name: bool(getattr(settings, kind.decided_by)) for kind in GATES.values() if kind.decided_by}
+
+
+@dataclass(frozen=True)
+class _Judge:
+    """Judge of values by the bounds of one flight."""
+
+    bounds: Mapping[str, Bound]
+    is_required: Mapping[str, bool]
+
+    def __call__(
+        self, name: str, value: float | None, reason: str = "", limit: Bound | None = None, geometry: str = ""
+    ) -> Gate:
+        kind = GATES[name]
+        usual = kind.required == "always" or (kind.required == "if_measured" and value is not None)
+        return judged_gate(
+            limit or kind.limit or self.bounds[name],
+            name,
+            kind.title.format(geometry=geometry),
+            value,
+            unit=kind.unit,
+            reason=reason,
+            required=self.is_required.get(name, usual),
+        )
 
 
 def build_gates(
-    samples: TaxiSamples, standstill: Standstill | None, figures: Figures, settings: HeadingSettings
+    samples: TaxiSamples, standstill: Standstill | None, values: JudgedValues, settings: HeadingSettings
 ) -> tuple[Gate, ...]:
     """Build every gate of the method in the order of the paper.
 
@@ -107,17 +131,19 @@ def build_gates(
     """
     rate_hz = 1.0 / samples.interval_s if samples.interval_s > 0.0 else PAPER_RATE_HZ
     bounds = gate_bounds(settings, int(samples.is_used.sum()), rate_hz)
+    judge = _Judge(bounds, _required_by(settings))
     return (
-        *_throughout_gates(samples, figures, settings, bounds),
-        *_standstill_gates(standstill, bounds),
-        *_taxi_gates(samples, figures, settings, bounds),
-        *_normality_gates(figures.normality, bounds),
-        *_steadiness_gates(figures, bounds),
+        *_throughout_gates(samples, values, settings, judge),
+        *_standstill_gates(standstill, judge),
+        *_taxi_gates(samples, settings, judge),
+        *_accuracy_gates(samples, values, judge),
+        *_normality_gates(values.normality, judge),
+        *_steadiness_gates(values, judge),
     )
 
 
 def _throughout_gates(
-    samples: TaxiSamples, figures: Figures, settings: HeadingSettings, bounds: Bounds
+    samples: TaxiSamples, values: JudgedValues, settings: HeadingSettings, judge: _Judge
 ) -> tuple[Gate, ...]:
     judged = is_straight_and_fast(samples, settings) & np.isin(
         samples.gate, ["used", "geometry", "integrity", "outlier"]
@@ -126,219 +152,121 @@ def _throughout_gates(
     geometry, integrity = geometry[np.isfinite(geometry)], integrity[np.isfinite(integrity)]
     is_sigma = samples.geometry_name == VELOCITY_SIGMA
     most = settings.velocity_sigma_max_mps if is_sigma else settings.geometry_max
-    geometry = geometry * (most / settings.geometry_max)
+    geometry = geometry * (most / settings.geometry_max)  # samples store a velocity sigma scaled to it: back to m/s
     limit = f"at most {most:g} m/s" if is_sigma else f"at most {most:g}"
     name = f"{VELOCITY_SIGMA} of the receiver" if is_sigma else samples.geometry_name or "GDOP"
-    changes = figures.mode_changes
+    changes = values.mode_changes
     return (
-        judged_gate(
-            bounds["geometry"],
+        judge(
             "geometry",
-            f"share of straight taxi with {name} {limit}",
             float(np.mean(geometry <= most)) if len(geometry) else None,
-            reason=f"largest {np.max(geometry):.3g}" if len(geometry) else "no GDOP, PDOP or HDOP in the log",
+            f"largest {np.max(geometry):.3g}" if len(geometry) else "no GDOP, PDOP or HDOP in the log",
+            geometry=f"{name} {limit}",
         ),
-        judged_gate(
-            bounds["integrity"],
+        judge(
             "integrity",
-            "share of straight taxi with integrity good",
             float(np.mean(integrity > 0.5)) if len(integrity) else None,
-            reason="" if len(integrity) else "no integrity flag, fix type or RAIM in the log",
-            required=bool(len(integrity)),
+            "" if len(integrity) else "no integrity flag, fix type or RAIM in the log",
         ),
-        judged_gate(
-            (1.0, None),
+        judge(
             "ground",
-            "share of used samples with ground contact proven",
             float(np.mean(samples.on_ground[samples.is_used])) if samples.ground_method else None,
-            reason=samples.ground_method or "nothing in the log proves ground contact",
+            samples.ground_method or "nothing in the log proves ground contact",
         ),
-        judged_gate(
-            (None, 0.0),
+        judge(
             "ins_mode",
-            "changes of INS mode from the end of standstill to the end of taxi",
             None if changes is None else float(changes),
-            reason="INS mode not in the log" if changes is None else "",
-            required=changes is not None,
+            "INS mode not in the log" if changes is None else "",
         ),
     )
 
 
-def _standstill_gates(standstill: Standstill | None, bounds: Bounds) -> tuple[Gate, ...]:
+def _standstill_gates(standstill: Standstill | None, judge: _Judge) -> tuple[Gate, ...]:
     missing = "no standstill before taxi in the log" if standstill is None else ""
     seconds = None if standstill is None else standstill.end_s - standstill.start_s
     seen, unseen = standstill, missing
     if standstill is not None and standstill.velocity_is_held:
         seen, unseen = None, "the receiver holds its velocity when standing: its error cannot be seen"
     return (
-        judged_gate(
-            bounds["standstill_duration"],
-            "standstill_duration",
-            "standstill assessed",
-            seconds,
-            unit="s",
-            reason=missing,
-        ),
-        judged_gate(
-            bounds[STANDSTILL_GATE],
-            STANDSTILL_GATE,
-            "length of the mean GNSS velocity at standstill",
-            None if seen is None else seen.speed_of_mean_mps,
-            unit="m/s",
-            reason=unseen or f"over {seconds:.0f} s",
-        ),
-        judged_gate(
-            bounds["standstill_bound97"],
-            "standstill_bound97",
-            "0.97 bound of the mean speed at standstill",
-            None if seen is None else seen.speed_bound97_mps,
-            unit="m/s",
-            reason=unseen,
-            required=False,
-        ),
+        judge("standstill_duration", seconds, missing),
+        judge(STANDSTILL_SPEED, None if seen is None else seen.speed_of_mean_mps, unseen or f"over {seconds:.0f} s"),
+        judge("standstill_bound97", None if seen is None else seen.speed_bound97_mps, unseen),
     )
 
 
-def _taxi_gates(samples: TaxiSamples, figures: Figures, settings: HeadingSettings, bounds: Bounds) -> tuple[Gate, ...]:
-    outliers, used = int(np.sum(samples.gate == "outlier")), int(samples.is_used.sum())
+def _taxi_gates(samples: TaxiSamples, settings: HeadingSettings, judge: _Judge) -> tuple[Gate, ...]:
+    """Judge the epochs by where they lie and how many were left out."""
+    used = int(samples.is_used.sum())
     later = int(samples.is_after_lift_off[samples.is_used].sum())
     run = is_straight_and_fast(samples, settings) & np.isin(samples.gate, NOT_TAXI)
-    required = _required_by(settings)
     return (
-        judged_gate(
-            (None, 1.0),
+        judge(
             "not_taxi",
-            "share of straight epochs in take-off run and landing roll",
             float(run.sum()) / max(int(run.sum()) + used, 1),
-            reason=f"{run.sum()} epochs" if run.any() else "",
-            required=False,
+            f"{run.sum()} epochs" if run.any() else "",
         ),
-        judged_gate(
-            (1.0, None),
+        judge(
             "before_take_off",
-            "share of used samples before take-off",
             (used - later) / max(used, 1),
-            reason=f"{later} of {used} are from after the flight: too little straight taxi before it" if later else "",
-        ),
-        judged_gate(bounds["taxi_seconds"], "taxi_seconds", "straight taxi", figures.taxi_seconds, unit="s"),
-        judged_gate(
-            bounds["outliers"],
-            "outliers",
-            "share of outliers among straight samples",
-            outliers / max(outliers + used, 1),
-            reason=f"{outliers} of {outliers + used}",
-        ),
-        judged_gate(
-            (None, HELD_MAX_S),
-            "held_velocity",
-            "turns of the INS that the GNSS velocity does not show",
-            figures.held_s,
-            unit="s",
-            reason="no turn in motion" if figures.held_s is None else "",
-            required=figures.held_s is not None,
-        ),
-        judged_gate(
-            (9.0, None),
-            "gnss_rate",
-            "GNSS rate (10 Hz in Markelov 2015)",
-            1.0 / samples.interval_s if samples.interval_s > 0 else None,
-            unit="Hz",
-            required=False,
-        ),
-        judged_gate(
-            bounds["precision"],
-            "precision",
-            "precision e of Markelov 2015",
-            figures.precision_deg,
-            unit="deg",
-            required=required["precision"],
-        ),
-        judged_gate(bounds["quality"], "quality", "spread of the running mean", figures.quality_deg, unit="deg"),
-        judged_gate(
-            bounds["half_width"],
-            "half_width",
-            "half width of the 95 % interval from this taxi alone",
-            figures.half_width_deg,
-            unit="deg",
-            required=required[TAXI_ALONE],
-        ),
-        judged_gate(
-            bounds["whole_half_width"],
-            "whole_half_width",
-            "half width of the 95 % interval: this taxi, wind and installation together",
-            figures.whole_half_width_deg,
-            unit="deg",
-            reason=f"{NORMAL_95 * figures.steady_sigma_deg:.2f} deg of it wind and installation",
-            required=required[WHOLE],
+            f"{later} of {used} are from after the flight: too little straight taxi before it" if later else "",
         ),
     )
 
 
-def _normality_gates(normal: Normality | None, bounds: Bounds) -> tuple[Gate, ...]:
-    few = "too few samples, or no spread"
-
-    def p_value(value: float) -> str:
-        return f"p = {value:.2g} for independent samples, not gated"
-
+def _accuracy_gates(samples: TaxiSamples, values: JudgedValues, judge: _Judge) -> tuple[Gate, ...]:
+    """Judge how much taxi there is, and how well it shows the error."""
+    outliers, used = int(np.sum(samples.gate == "outlier")), int(samples.is_used.sum())
+    steady_deg = values.steady_sigma_deg
+    of_steady_terms = "" if steady_deg is None else f"{NORMAL_95 * steady_deg:.2f} deg of it wind and installation"
     return (
-        judged_gate(
-            bounds["skewness"],
-            "skewness",
-            "skewness of the differences, absolute",
-            None if normal is None else abs(normal.skewness),
-            reason=few if normal is None else p_value(normal.skewness_p),
-        ),
-        judged_gate(
-            bounds["kurtosis"],
-            "kurtosis",
-            "excess kurtosis of the differences",
-            None if normal is None else normal.excess_kurtosis,
-            reason=few if normal is None else p_value(normal.kurtosis_p),
-        ),
-        judged_gate(
-            bounds["normal_distance"],
-            "normal_distance",
-            "distance to the fitted normal distribution",
-            None if normal is None else normal.distance,
-            reason=few if normal is None else p_value(normal.distance_p),
-        ),
+        judge("taxi_seconds", values.taxi_seconds),
+        judge("outliers", outliers / max(outliers + used, 1), f"{outliers} of {outliers + used}"),
+        judge("held_velocity", values.held_s, "no turn in motion" if values.held_s is None else ""),
+        judge("gnss_rate", 1.0 / samples.interval_s if samples.interval_s > 0 else None),
+        judge("precision", values.precision_deg),
+        judge("quality", values.quality_deg),
+        judge(TAXI_ALONE, values.half_width_deg),
+        judge(WHOLE, values.whole_half_width_deg, of_steady_terms),
     )
 
 
-def _steadiness_gates(figures: Figures, bounds: Bounds) -> tuple[Gate, ...]:
-    variance, parts = figures.variance, figures.disagreement
-    drift, sigma = figures.drift_deg_per_h, figures.drift_sigma_deg_per_h
+def _normality_gates(normal: Normality | None, judge: _Judge) -> tuple[Gate, ...]:
+    if normal is None:
+        return tuple(judge(name, None, "too few samples, or no spread") for name in OF_NORMALITY)
+    measures = abs(normal.skewness), normal.excess_kurtosis, normal.distance
+    chances = normal.skewness_p, normal.kurtosis_p, normal.distance_p
+    return tuple(
+        judge(name, value, f"p = {chance:.2g} for independent samples, not gated")
+        for name, value, chance in zip(OF_NORMALITY, measures, chances, strict=True)
+    )
+
+
+def _steadiness_gates(values: JudgedValues, judge: _Judge) -> tuple[Gate, ...]:
+    variance, parts = values.variance, values.disagreement
+    drift, sigma = values.drift_deg_per_h, values.drift_sigma_deg_per_h
     return (
-        judged_gate(
-            bounds["variance_ratio"],
+        judge(
             "variance_ratio",
-            "variance of the differences over that of track and sway",
             None if variance is None else variance.ratio,
-            reason="no standstill variance, or too few samples"
+            "no standstill variance, or too few samples"
             if variance is None
             else f"95 % interval {variance.low:.2f} to {variance.high:.2f}",
         ),
-        judged_gate(
-            bounds["drift"],
+        judge(
             "drift",
-            "azimuth drift over its standard deviation",
             abs(drift) / sigma if drift is not None and sigma else None,
-            reason="taxi too short" if drift is None else f"{drift:+.1f} +- {sigma:.1f} deg/h",
+            "taxi too short" if drift is None else f"{drift:+.1f} +- {sigma:.1f} deg/h",
         ),
-        judged_gate(
-            (None, 1.0 if parts is None else parts.limit),
+        judge(
             "segments",
-            "disagreement of segments and minutes, chi-square per degree of freedom",
             None if parts is None else parts.chi2,
-            reason="one part" if parts is None else parts.told,
-            required=parts is not None,
+            "one part" if parts is None else parts.told,
+            None if parts is None else (None, parts.limit),
         ),
-        judged_gate(
-            (None, 0.0),
+        judge(
             "steps",
-            "steps of the INS heading",
-            float(len(figures.steps)),
-            reason=", ".join(f"{step.size_deg:+.2f} deg at {step.time_s:.1f} s" for step in figures.steps),
+            float(len(values.steps)),
+            ", ".join(f"{step.size_deg:+.2f} deg at {step.time_s:.1f} s" for step in values.steps),
         ),
     )
 
@@ -348,10 +276,10 @@ def _is_curable(gate: Gate, standstill: Standstill | None, settings: HeadingSett
         return True
     # A receiver that passes 97 % of 30-s intervals passes about 70 % of 10-s ones: a short interval says "extend".
     is_short = standstill is not None and standstill.end_s - standstill.start_s < settings.standstill_max_s - 1.0
-    return gate.name == STANDSTILL_GATE and is_short
+    return gate.name == STANDSTILL_SPEED and is_short
 
 
-def is_mostly_steady(whole_deg: float, alone_deg: float) -> bool:
+def is_mostly_steady(whole_half_width_deg: float, alone_half_width_deg: float) -> bool:
     """Tell whether wind and installation make more of the interval than this taxi.
 
     Examples
@@ -359,7 +287,7 @@ def is_mostly_steady(whole_deg: float, alone_deg: float) -> bool:
     >>> is_mostly_steady(0.3, 0.2), is_mostly_steady(0.3, 0.25)
     (True, False)
     """
-    return whole_deg**2 >= 2.0 * alone_deg**2
+    return whole_half_width_deg**2 >= 2.0 * alone_half_width_deg**2
 
 
 def _lacks_steady_parts(gates: tuple[Gate, ...]) -> bool:
@@ -413,11 +341,9 @@ def explain(
 
     A number not to be entered says so.
     """
+    number = f"{round_to_step(-error_deg, step_deg):+g} deg"
     if verdict == "accept":
-        return f"every required gate passed: enter {round_to_step(-error_deg, step_deg):+g} deg"
+        return f"{ALL_PASSED}{ENTER}{number}"
     if verdict == "advisory":
-        return (
-            f"good to +-{half_width_deg * ARCMIN_PER_DEG:.0f} arcmin; {CURES}. "
-            f"To be entered only where that is enough: {round_to_step(-error_deg, step_deg):+g} deg"
-        )
-    return f"{told(gates)}. Not to be entered: {round_to_step(-error_deg, step_deg):+g} deg"
+        return f"{good_to(half_width_deg * ARCMIN_PER_DEG)}{BETWEEN}{CURES}{IF_ENOUGH}{number}"
+    return f"{told(gates)}{NOT_ENTERED}{number}"

@@ -18,8 +18,6 @@ from groundstation.systems.magnetic.gyros import GyroDrift
 from groundstation.systems.magnetic.settings import MagneticSettings
 
 S_PER_H = 3600.0
-# What these gates of system 1 find is not in its interval; all that the others find widens it.
-NOT_IN_INTERVAL = frozenset({"steps", "ins_mode", "held_velocity", "segments", "ground", "drift"})
 BELIEVED_SIGMAS = 3.0  # of gyro drift and prior together: further off the rates are not those the INS navigates with
 
 
@@ -147,8 +145,8 @@ def refused(found: HeadingByTrack) -> str:
 
     Something failed that its interval does not hold.
     """
-    failed = {gate.name for gate in found.gates if gate.required and gate.state == "failed"}
-    if not failed & NOT_IN_INTERVAL and not (found.verdict == "reject" and not failed):
+    is_told_why = any(gate.required and gate.state == "failed" for gate in found.gates)
+    if not found.failed_beside_interval and (is_told_why or found.verdict != "reject"):
         return ""
     return f"the heading error is rejected ({found.verdict_reason})"
 

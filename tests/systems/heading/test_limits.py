@@ -1,8 +1,16 @@
 """Shipped limits of the heading correction, each held to its source: changing one is a decision with a reason."""
 
+from dataclasses import fields
+
+import numpy as np
 import pytest
 
 from groundstation.base.units import ARCMIN_PER_DEG
+from groundstation.simulation.taxi import TaxiCase, simulate_taxi, taxi_flight
+from groundstation.systems.heading.advice_chapter import STANDSTILL_S
+from groundstation.systems.heading.answer import MEAN_SPEED_LIMIT, RAW_SPEED_LIMIT
+from groundstation.systems.heading.estimate import estimate_heading_error
+from groundstation.systems.heading.gates_answer import GATES, LIMITS
 from groundstation.systems.heading.settings import HeadingSettings
 from groundstation.systems.heading.verdict import gate_bounds
 
@@ -30,6 +38,12 @@ def test_a_shipped_limit_is_that_of_its_source(name: str, value: float, source: 
     assert getattr(HeadingSettings(), name) == value, source
 
 
+def test_limits_that_figures_show_without_an_answer_are_the_shipped_ones() -> None:
+    shipped = HeadingSettings()
+    for name, value in (RAW_SPEED_LIMIT, MEAN_SPEED_LIMIT, ("standstill_max_s", STANDSTILL_S)):
+        assert getattr(shipped, name) == value
+
+
 def test_the_whole_interval_may_be_as_wide_as_the_published_errors() -> None:
     assert HeadingSettings().whole_half_width_max_deg * ARCMIN_PER_DEG == pytest.approx(20.0), PAPER
 
@@ -41,3 +55,13 @@ def test_the_gates_use_the_shipped_limits() -> None:
     assert bounds["standstill_speed_of_mean"] == (None, 0.01)
     assert bounds["taxi_seconds"] == (20.0, None)
     assert bounds["whole_half_width"] == (None, pytest.approx(20.0 / 60.0))
+
+
+def test_each_gate_is_a_row_of_the_table_and_has_a_bound() -> None:
+    built = estimate_heading_error(taxi_flight(simulate_taxi(TaxiCase(), np.random.default_rng(0)))).gates
+    assert {gate.name for gate in built} == set(GATES) and len(built) == len(GATES)
+    for kind in GATES.values():
+        assert (kind.limit is None) == bool(kind.setting), kind.name
+        assert kind.required == "never" or kind.failed, f"{kind.name}: no words for a crew"
+    names = {field.name for field in fields(HeadingSettings)}
+    assert names >= LIMITS and {kind.setting for kind in GATES.values() if kind.setting} <= names

@@ -20,10 +20,12 @@ from groundstation.results.chosen import Interval
 from groundstation.results.gates import Gate
 from groundstation.simulation.processes import gauss_markov
 from groundstation.simulation.taxi import TaxiCase, noiseless, simulate_taxi, table_of, taxi_flight
+from groundstation.systems.heading.answer import Verdict
 from groundstation.systems.heading.arms import know_arm
 from groundstation.systems.heading.checks import about_running_line
 from groundstation.systems.heading.estimate import estimate_heading_error
 from groundstation.systems.heading.normality import kurtosis_z, normality, skewness_z
+from groundstation.systems.heading.reason_answer import ALL_PASSED, GOOD_TO, why_alone
 from groundstation.systems.heading.recursion import run_recursion
 from groundstation.systems.heading.references import (
     logged_reference,
@@ -36,7 +38,7 @@ from groundstation.systems.heading.references import (
 from groundstation.systems.heading.settings import HeadingSettings
 from groundstation.systems.heading.standstill import find_standstill, speed_bound_mps
 from groundstation.systems.heading.steps import heading_steps
-from groundstation.systems.heading.verdict import decide, explain
+from groundstation.systems.heading.verdict import CURES, decide, explain
 from groundstation.systems.known import AircraftData, Runway, SiteData, Stand
 from groundstation.tables.epochs import distinct_epochs
 from groundstation.tables.table import Flight, Table
@@ -601,6 +603,28 @@ def test_short_standstill_that_fails_asks_for_more() -> None:
 def test_number_to_type_has_the_other_sign() -> None:
     assert explain("accept", (), 0.83, 0.1) == "every required gate passed: enter -0.8 deg"
     assert "Not to be entered" in explain("reject", (gate("quality", "failed"),), 0.83, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "against", "why"),
+    [
+        ("accept", (), (ALL_PASSED,)),
+        ("advisory", (("whole_half_width", "failed"),), (CURES,)),
+        ("reject", (("quality", "failed"), ("steps", "failed")), ("steps", "running mean")),
+        ("extend", (("taxi_seconds", "failed"), ("precision", "failed")), ("of straight taxi", "precision e")),
+        ("undecided", (("integrity", "not_measured"),), ("GNSS integrity",)),
+    ],
+)
+def test_reason_of_each_verdict_is_taken_apart_as_it_was_written(
+    verdict: Verdict, against: tuple[tuple[str, str], ...], why: tuple[str, ...]
+) -> None:
+    """Nothing of the number to enter, nor of how good it is, is left in the parts."""
+    gates = tuple(gate(name, state) for name, state in against)
+    reason = explain(verdict, gates, 0.83, 0.1, 0.4)
+    assert "-0.8 deg" in reason and (verdict == "advisory") == reason.startswith(GOOD_TO)
+    parts = why_alone(reason)
+    assert len(parts) == len(why) and all(word in part for word, part in zip(why, parts, strict=True))
+    assert not [part for part in parts if "-0.8" in part or "entered" in part or "enter " in part or "arcmin" in part]
 
 
 def test_every_failed_required_gate_is_told_the_plain_ones_first() -> None:

@@ -29,10 +29,11 @@ from groundstation.simulation.magnetic_family import MagneticFamilySettings, sim
 from groundstation.simulation.scenario import load_scenario
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.estimate import estimate_heading_error
+from groundstation.systems.heading.gates_answer import NOT_IN_INTERVAL
 from groundstation.systems.heading.on_ground import Estimator
 from groundstation.systems.heading.settings import HeadingSettings
 from groundstation.systems.known import AircraftData
-from groundstation.systems.magnetic.alignment import NOT_IN_INTERVAL, against_heading, align, refused
+from groundstation.systems.magnetic.alignment import against_heading, align, refused
 from groundstation.systems.magnetic.answer import Alignment, MagneticResult
 from groundstation.systems.magnetic.apply_deviation import ins_error_deg
 from groundstation.systems.magnetic.attitude import field_in_body

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from groundstation.systems.heading.estimate import estimate_heading_error
-from groundstation.systems.magnetic.alignment import NOT_IN_INTERVAL
+from groundstation.systems.heading.gates_answer import NOT_IN_INTERVAL
 from groundstation.systems.magnetic.study.cases import seed_of
 from groundstation.systems.magnetic.study.taxis import (
     TaxiOutcome,

@@ -13,6 +13,7 @@ from groundstation.results.flight import FlightResults
 from groundstation.results.installations import Lesson, Measured, as_stored
 from groundstation.results.roles import AzimuthByTurns, CompassCoefficients, Delays
 from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.heading.gates_answer import STILL_TEACHES
 from groundstation.systems.heading.installation.settings import (
     MOUNTING_DEG,
     ORDINARY_WIND_MPS,
@@ -21,13 +22,10 @@ from groundstation.systems.heading.installation.settings import (
 )
 from groundstation.systems.heading.references import REFERENCE_SIGMA_DEG, logged_reference
 from groundstation.systems.heading.steady import FACTORS, STATED_AT_MPS
-from groundstation.systems.heading.verdict import CURED_BY_MORE_DATA, STANDSTILL_GATE
 
 LARGEST = 1e3  # no angle in degrees, no wind in m/s is larger
 RUNWAY_CRAB_DEG = 0.3  # of power and wind on the take-off run
 LATER_ALIGNMENT = frozenset({"inertial.ins_reset", "inertial.realigned"})  # findings: in flight it is another azimuth
-# Gates whose failure leaves the interval by this taxi alone as honest as it was: it is wide, or the standstill noisy.
-STILL_TEACHES = CURED_BY_MORE_DATA | {STANDSTILL_GATE, "skewness", "kurtosis", "normal_distance", "variance_ratio"}
 
 
 @dataclass(frozen=True)

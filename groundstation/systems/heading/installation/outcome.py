@@ -12,10 +12,12 @@ from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.methods.intervals import mixture_quantile
 from groundstation.results.installations import Lesson
 from groundstation.results.roles import IntervalPart
+from groundstation.systems.heading.gates_answer import WHOLE
 from groundstation.systems.heading.installation.answer import InstallationResult
 from groundstation.systems.heading.installation.model import Belief, Mixture, doubts, installed, predict
 from groundstation.systems.heading.installation.settings import InstallationSettings
-from groundstation.systems.heading.verdict import WHOLE, is_mostly_steady, round_to_step
+from groundstation.systems.heading.reason_answer import ALL_PASSED, ENTER, good_to
+from groundstation.systems.heading.verdict import is_mostly_steady, round_to_step
 
 FloatArray = NDArray[np.float64]
 AIRFRAME, PLATFORM = 0, 1
@@ -132,12 +134,12 @@ def verdict_of(lesson: Lesson, half_width_deg: float) -> str:
 
 def _reason(lesson: Lesson, verdict: str, number: LearnedNumber, correction_deg: float) -> str:
     if verdict == "accept":
-        return f"every required gate passed: enter {correction_deg:+g} deg"
+        return f"{ALL_PASSED}{ENTER}{correction_deg:+g} deg"
     if verdict in ("reject", "undecided"):
         return f"as by this taxi alone: {', '.join(lesson.failed)}"
     if verdict == "extend":
         return f"more of the same taxi is needed: {', '.join(lesson.failed)}"
-    return f"good to +-{number.half_width_deg * ARCMIN_PER_DEG:.0f} arcmin only"
+    return f"{good_to(number.half_width_deg * ARCMIN_PER_DEG)} only"
 
 
 def named(flights: Sequence[str], probability: Sequence[float], settings: InstallationSettings) -> tuple[str, ...]:

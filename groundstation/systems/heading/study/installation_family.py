@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.results.installations import Lesson
+from groundstation.systems.heading.gates_answer import CURED_BY_MORE_DATA, WHOLE
 from groundstation.systems.heading.installation.settings import (
     MOUNTING_DEG,
     ORDINARY_WIND_MPS,
@@ -19,7 +20,6 @@ from groundstation.systems.heading.installation.settings import (
 )
 from groundstation.systems.heading.steady import FACTORS
 from groundstation.systems.heading.study.installation_pool import TaxiOfPool
-from groundstation.systems.heading.verdict import CURED_BY_MORE_DATA, WHOLE
 from groundstation.systems.known import AircraftClass
 
 AIRCRAFT, FLIGHTS = 100, 6

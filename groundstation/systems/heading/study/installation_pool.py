@@ -13,7 +13,7 @@ from groundstation.results.figures import FigureData
 from groundstation.simulation.taxi import draw_case, simulate_taxi, taxi_flight
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.estimate import estimate_heading_error
-from groundstation.systems.heading.verdict import STANDSTILL_GATE, WHOLE
+from groundstation.systems.heading.gates_answer import STANDSTILL_SPEED, WHOLE
 from groundstation.systems.known import AircraftData
 from groundstation.systems.study import RunStore
 from groundstation.tables.phases import flight_phases
@@ -46,7 +46,7 @@ class TaxiOfPool:
     @property
     def passes_standstill(self) -> bool:
         """Tell whether the mean velocity at standstill is within the limit."""
-        return STANDSTILL_GATE not in self.failed
+        return STANDSTILL_SPEED not in self.failed
 
 
 def draw_taxi(seed: int, number: int) -> TaxiOfPool:
