@@ -8,6 +8,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.errors import NotAssessableError
+from groundstation.base.geodesy import METRES_PER_DEG
 from groundstation.base.signals import topics_of_kind
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.arrays.typed import joined
@@ -40,7 +41,7 @@ from groundstation.systems.landing.geometry import (
     runway_of,
 )
 from groundstation.systems.landing.height import height_error
-from groundstation.systems.landing.path import METRES_PER_DEG, FlightPath, path_of, position_topics, step_of
+from groundstation.systems.landing.path import FlightPath, path_of, position_topics, step_of
 from groundstation.systems.landing.protection import protection_along
 from groundstation.systems.landing.reference import (
     Positions,
@@ -57,7 +58,7 @@ if TYPE_CHECKING:
 
 SATELLITES = "GPS"  # as recorders name the source of guidance
 TURN_S = 180.0  # before a final, in which it is turned onto the course
-MOST_APPROACHES = 50
+MOST_ANALYSED = 50  # a log of many circuits takes no longer
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +98,7 @@ def _finals(
     ends = ends_of(path, known.phases, settings)
     if not ends:
         raise NotAssessableError("landing", "no landing in the log, and no guided descent followed by a climb")
-    found = [final_of(path, end, known.site, settings) for end in ends[:MOST_APPROACHES]]
+    found = [final_of(path, end, known.site, settings) for end in ends[:MOST_ANALYSED]]
     left_out = tuple(one for one in found if isinstance(one, LeftOutApproach))
     finals = [one for one in found if isinstance(one, Final)]
     if not finals:

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from groundstation.base.angles import FloatArray, direction_of, wrap_180
-from groundstation.base.geodesy import north_east_m
+from groundstation.base.geodesy import METRES_PER_DEG, north_east_m
 from groundstation.systems.known import Runway, SiteData
 from groundstation.systems.landing.answer import LeftOutApproach, Outcome
-from groundstation.systems.landing.path import METRES_PER_DEG, FlightPath, on_guidance, step_of
+from groundstation.systems.landing.path import FlightPath, on_guidance, step_of
 from groundstation.systems.landing.settings import LandingSettings
 
 if TYPE_CHECKING:

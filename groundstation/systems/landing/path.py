@@ -22,7 +22,6 @@ HIGHEST_RATE_HZ = 4.0
 LARGEST_GAP_S = 5.0
 SHORTEST_LEAVE_S = 2.5  # what leaves the guidance for less has not left it
 POSITION = ("latitude_deg", "longitude_deg")
-METRES_PER_DEG = 111_195.0  # of latitude, for the size of steps
 SMOOTHED_S = 6.0  # over which speeds and sink rates of stepped signals are taken
 # Height -> whether it counts from the airfield.
 HEIGHTS = (

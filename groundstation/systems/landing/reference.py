@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray
-from groundstation.base.geodesy import continuous_longitude_deg
+from groundstation.base.geodesy import MEAN_RADIUS_M, continuous_longitude_deg
 from groundstation.base.records import BoolArray
 from groundstation.base.units import M_PER_NAUTICAL_MILE
 from groundstation.results.landing_categories import LINEAR_95
@@ -235,8 +235,8 @@ def _parts(
 
 def step_across_m(positions: Positions, runway: RunwayUsed) -> FloatArray:
     """Return the size across the course of a step of latitude and of longitude, metres."""
-    north_m = np.deg2rad(positions.step_deg[0]) * 6_371_000.0
-    east_m = np.deg2rad(positions.step_deg[1]) * 6_371_000.0 * np.cos(np.deg2rad(runway.latitude_deg))
+    north_m = np.deg2rad(positions.step_deg[0]) * MEAN_RADIUS_M
+    east_m = np.deg2rad(positions.step_deg[1]) * MEAN_RADIUS_M * np.cos(np.deg2rad(runway.latitude_deg))
     course_rad = np.deg2rad(runway.true_course_deg)
     return np.asarray(np.abs([north_m * np.sin(course_rad), east_m * np.cos(course_rad)]))
 
