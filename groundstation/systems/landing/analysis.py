@@ -33,12 +33,12 @@ from groundstation.systems.landing.findings import findings_of
 from groundstation.systems.landing.geometry import (
     ROLL_OUT_MIN_MPS,
     ROLL_OUT_S,
-    Against,
-    against,
+    RelativeToRunway,
     along_and_across,
     line_through,
-    path_columns,
+    relative_to_runway,
     runway_of,
+    samples_of_final,
 )
 from groundstation.systems.landing.height import height_error
 from groundstation.systems.landing.path import FlightPath, path_of, position_topics, step_of
@@ -131,11 +131,13 @@ def _figures(told: Sequence[_Told]) -> tuple[FigureData, ...]:
 
 def _approach(number: int, flight: "Flight", path: FlightPath, final: Final, settings: LandingSettings) -> _Told:
     runway = runway_of(path, final, settings)
-    near = against(path, final, runway)
-    rows = near.rows
-    height = near.height_m[near.is_final]
+    relative = relative_to_runway(path, final, runway)
+    rows = relative.rows
+    height = relative.height_m[relative.is_final]
     step_m, source = _step_m(path), _source(flight, path, final)
-    sensitivity = _sensitivity(path, near, runway, source, float(np.hypot(*step_m))) if path.guidance_topic else None
+    sensitivity = (
+        _sensitivity(path, relative, runway, source, float(np.hypot(*step_m))) if path.guidance_topic else None
+    )
     errors = _position_errors(flight, path, final, runway, source, sensitivity, settings)
     protection = protection_along(flight, path.time_s[final.first], final.end.time_s, number)
     lands = final.end.outcome == "landing"
@@ -144,24 +146,26 @@ def _approach(number: int, flight: "Flight", path: FlightPath, final: Final, set
         final.end.outcome,
         float(path.time_s[final.first]),
         final.end.time_s,
-        float(near.distance_m[0]),
+        float(relative.distance_m[0]),
         float(np.nanmin(height)) if np.isfinite(height).any() else None,
         path.position_topic,
         path.guidance_topic,
         source,
         path.altitude_source,
         runway,
-        _established(path, final, near),
+        _established(path, final, relative),
         sensitivity,
-        touchdown_of(flight, path, final, runway, near) if lands else None,
-        stabilised(path, near, settings),
+        touchdown_of(flight, path, final, runway, relative) if lands else None,
+        stabilised(path, relative, settings),
         errors,
         None if protection is None else protection[0],
         _claim(errors, runway),
         step_m if any(step_m) else None,
         _height_errors(flight, path, runway, final.end.time_s, settings) if lands else (),
     )
-    return _Told(approach, path_columns(number, path, near, rows), None if protection is None else protection[1])
+    return _Told(
+        approach, samples_of_final(number, path, relative, rows), None if protection is None else protection[1]
+    )
 
 
 def _step_m(path: FlightPath) -> tuple[float, float]:
@@ -182,15 +186,15 @@ def _source(flight: "Flight", path: FlightPath, final: Final) -> str:
     return name or (f"{tuned[-1]:.2f} MHz" if tuned.size else "")
 
 
-def _established(path: FlightPath, final: Final, near: Against) -> Established | None:
+def _established(path: FlightPath, final: Final, relative: RelativeToRunway) -> Established | None:
     if final.established is None:
         return None
     first, last = final.established
     rows = slice(first, last)
-    own = slice(first - near.rows.start, last - near.rows.start)
+    own = slice(first - relative.rows.start, last - relative.rows.start)
     line = line_through(path, rows)
-    height = near.height_m[own]
-    vertical_m, vertical_dots = _rms(near.vertical_guidance_m[own]), _rms(path.vertical_dots[rows])
+    height = relative.height_m[own]
+    vertical_m, vertical_dots = _rms(relative.vertical_guidance_m[own]), _rms(path.vertical_dots[rows])
     return Established(
         float(path.time_s[first]),
         float(path.time_s[last - 1]),
@@ -200,7 +204,7 @@ def _established(path: FlightPath, final: Final, near: Against) -> Established |
         line.course_deg,
         _rms(path.lateral_dots[rows]) or 0.0,
         vertical_dots,
-        _rms(near.lateral_guidance_m[own]) or 0.0,
+        _rms(relative.lateral_guidance_m[own]) or 0.0,
         vertical_m,
     )
 
@@ -214,13 +218,15 @@ def _rms(values: FloatArray) -> float | None:
     return float(np.sqrt(np.mean(known**2))) if known.size else None
 
 
-def _sensitivity(path: FlightPath, near: Against, runway: RunwayUsed, source: str, step_m: float) -> Sensitivity:
+def _sensitivity(
+    path: FlightPath, relative: RelativeToRunway, runway: RunwayUsed, source: str, step_m: float
+) -> Sensitivity:
     """Estimate the localizer's sensitivity on the final and the turn onto it.
 
     The final alone has few deviations. Satellite guidance is judged on the final only.
     """
-    last = near.rows.start + int(np.count_nonzero(near.is_final))
-    first = near.rows.start
+    last = relative.rows.start + int(np.count_nonzero(relative.is_final))
+    first = relative.rows.start
     if SATELLITES not in source:  # which guides along the leg before, until the turn is made
         first = int(np.searchsorted(path.time_s, path.time_s[first] - TURN_S))
     distance_m, across_m = along_and_across(path.latitude_deg[first:last], path.longitude_deg[first:last], runway)

@@ -1,7 +1,7 @@
-"""The runway of a final, and where the aircraft was against its path.
+"""The runway of a final, and where the aircraft was relative to it and to its glide path.
 
 Distances are along the runway, positive before the threshold; across, right of the course is positive; errors and
-deviations are aircraft minus path.
+deviations are aircraft minus glide path.
 """
 
 from dataclasses import dataclass, replace
@@ -36,14 +36,17 @@ class FittedLine:
 
 
 @dataclass(frozen=True, eq=False)
-class Against:
-    """Samples of a final and its roll-out against the path, shape (n,), NaN where not known."""
+class RelativeToRunway:
+    """Samples of a final and its roll-out relative to runway and glide path.
+
+    Arrays have shape (n,), NaN where not known.
+    """
 
     rows: slice
     distance_m: FloatArray
     across_m: FloatArray
     height_m: FloatArray
-    path_height_m: FloatArray
+    glide_path_height_m: FloatArray
     lateral_guidance_m: FloatArray
     vertical_guidance_m: FloatArray
     is_final: BoolArray
@@ -166,8 +169,8 @@ def _threshold(path: FlightPath, final: Final, line: FittedLine, settings: Landi
     return float(latitude), float(longitude), reason
 
 
-def against(path: FlightPath, final: Final, runway: RunwayUsed) -> Against:
-    """Compare a final and its roll-out with the path of the runway."""
+def relative_to_runway(path: FlightPath, final: Final, runway: RunwayUsed) -> RelativeToRunway:
+    """Compare a final and its roll-out with runway and glide path."""
     last = final.last
     if final.end.outcome == "landing":
         rolls = (path.time_s <= final.end.time_s + ROLL_OUT_S) & ~(path.ground_speed_mps < ROLL_OUT_MIN_MPS)
@@ -178,17 +181,17 @@ def against(path: FlightPath, final: Final, runway: RunwayUsed) -> Against:
     height_m = _height(path, final, runway)[rows]
     slope = np.tan(np.deg2rad(runway.glide_angle_deg))
     curved_m = distance_m**2 / (2.0 * SEMI_MAJOR_M) * np.sign(distance_m)
-    path_height_m = runway.threshold_crossing_height_m + distance_m * slope + curved_m
+    glide_path_height_m = runway.threshold_crossing_height_m + distance_m * slope + curved_m
     from_origin_m = np.clip(distance_m + runway.threshold_crossing_height_m / slope, 0.0, None)
     is_final = np.arange(rows.start, rows.stop) < final.last
     lateral_dot_m = metres_per_dot(distance_m, runway)
     vertical_dot_m = GLIDE_SLOPE_DOT * np.deg2rad(runway.glide_angle_deg) * from_origin_m
-    return Against(
+    return RelativeToRunway(
         rows,
         distance_m,
         across_m,
         height_m,
-        path_height_m,
+        glide_path_height_m,
         path.lateral_dots[rows] * lateral_dot_m,
         np.where(is_final, path.vertical_dots[rows] * vertical_dot_m, np.nan),
         is_final,
@@ -236,19 +239,19 @@ def _height(path: FlightPath, final: Final, runway: RunwayUsed) -> FloatArray:
     return path.altitude_m - (float(np.median(ground_m)) if ground_m.size else np.nan)
 
 
-def path_columns(number: int, path: FlightPath, near: Against, rows: slice) -> LandingPath:
+def samples_of_final(number: int, path: FlightPath, relative: RelativeToRunway, rows: slice) -> LandingPath:
     """Every sample of a final and its roll-out."""
     return LandingPath(
         approach=np.full(rows.stop - rows.start, float(number)),
         time_s=path.time_s[rows],
-        distance_m=near.distance_m,
-        across_m=near.across_m,
-        height_m=near.height_m,
-        path_height_m=near.path_height_m,
-        lateral_guidance_m=near.lateral_guidance_m,
-        vertical_guidance_m=near.vertical_guidance_m,
-        lateral_dot_m=near.lateral_dot_m,
-        vertical_dot_m=near.vertical_dot_m,
+        distance_m=relative.distance_m,
+        across_m=relative.across_m,
+        height_m=relative.height_m,
+        path_height_m=relative.glide_path_height_m,
+        lateral_guidance_m=relative.lateral_guidance_m,
+        vertical_guidance_m=relative.vertical_guidance_m,
+        lateral_dot_m=relative.lateral_dot_m,
+        vertical_dot_m=relative.vertical_dot_m,
         lateral_dots=path.lateral_dots[rows],
         vertical_dots=path.vertical_dots[rows],
         latitude_deg=path.latitude_deg[rows],

@@ -6,7 +6,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.results.gates import Bound, Gate, judged_gate
 from groundstation.results.rules import Rejudged
 from groundstation.systems.landing.answer import LandingResult, StabilisedAt, StabilisedVerdict
-from groundstation.systems.landing.geometry import Against
+from groundstation.systems.landing.geometry import RelativeToRunway
 from groundstation.systems.landing.path import FlightPath
 from groundstation.systems.landing.settings import LandingSettings
 
@@ -14,17 +14,17 @@ LAST_SPEED_S = 10.0  # the speed of reference is that of so many seconds above t
 FEWEST = 3
 
 
-def stabilised(path: FlightPath, near: Against, settings: LandingSettings) -> tuple[StabilisedAt, ...]:
+def stabilised(path: FlightPath, relative: RelativeToRunway, settings: LandingSettings) -> tuple[StabilisedAt, ...]:
     """Judge the final from both gate heights, the higher first."""
-    return tuple(_from(path, near, height_m, settings) for height_m in (settings.gate_high_m, settings.gate_low_m))
+    return tuple(_from(path, relative, height_m, settings) for height_m in (settings.gate_high_m, settings.gate_low_m))
 
 
-def _from(path: FlightPath, near: Against, gate_m: float, settings: LandingSettings) -> StabilisedAt:
+def _from(path: FlightPath, relative: RelativeToRunway, gate_m: float, settings: LandingSettings) -> StabilisedAt:
     """Return the worst values from a gate down to the floor, or to the lowest point.
 
     They count from the last time the aircraft was above the gate.
     """
-    height = np.where(near.is_final, near.height_m, np.nan)
+    height = np.where(relative.is_final, relative.height_m, np.nan)
     known = np.isfinite(height)
     above = np.flatnonzero(known & (height >= gate_m))
     reason = _not_passed(height, gate_m)
@@ -32,8 +32,8 @@ def _from(path: FlightPath, near: Against, gate_m: float, settings: LandingSetti
         return StabilisedAt(gate_m, "not measured", None, (), reason)
     start = int(above[-1])
     below = np.flatnonzero(known & (height < settings.gate_floor_m) & (np.arange(len(height)) > start))
-    stop = int(below[0]) if below.size else int(np.flatnonzero(near.is_final)[-1]) + 1
-    rows = slice(near.rows.start + start, near.rows.start + stop)
+    stop = int(below[0]) if below.size else int(np.flatnonzero(relative.is_final)[-1]) + 1
+    rows = slice(relative.rows.start + start, relative.rows.start + stop)
     time_s = path.time_s[rows]
     speed, speed_name = path.airspeed_mps[rows], "airspeed"
     if not np.isfinite(speed).any():

@@ -10,7 +10,7 @@ from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import MPS2_PER_G
 from groundstation.systems.landing.answer import RunwayUsed, Touchdown
 from groundstation.systems.landing.finals import Final
-from groundstation.systems.landing.geometry import Against, along_and_across, line_through
+from groundstation.systems.landing.geometry import RelativeToRunway, along_and_across, line_through
 from groundstation.systems.landing.path import FlightPath, slope
 
 if TYPE_CHECKING:
@@ -22,14 +22,16 @@ LOAD_RANGE_G = (-1.0, 4.0)  # beyond it a sample is a fault of the recorder
 SPIKE_G = 1.5  # of one sample against both its neighbours
 
 
-def touchdown_of(flight: "Flight", path: FlightPath, final: Final, runway: RunwayUsed, near: Against) -> Touchdown:
+def touchdown_of(
+    flight: "Flight", path: FlightPath, final: Final, runway: RunwayUsed, relative: RelativeToRunway
+) -> Touchdown:
     """Measure the touchdown that a final ends in."""
     at_s = final.end.time_s
     places = path.latitude_deg, continuous_longitude_deg(path.longitude_deg)
     latitude, longitude = (float(np.interp(at_s, path.time_s, one)) for one in places)
     longitude = longitude if abs(longitude) <= 180.0 else float(wrap_180(longitude))
     distance_m, _across = along_and_across(np.array([latitude]), np.array([longitude]), runway)
-    on_ground = np.arange(near.rows.start, near.rows.stop)[~near.is_final]
+    on_ground = np.arange(relative.rows.start, relative.rows.stop)[~relative.is_final]
     course = None
     if len(on_ground) >= 3 and np.isfinite(path.ground_speed_mps[on_ground]).any():
         course = line_through(path, slice(int(on_ground[0]), int(on_ground[-1]) + 1)).course_deg
