@@ -75,11 +75,11 @@ def _run(flight: "Flight", known: Known, settings: LandingSettings) -> Found[Lan
     told = [_approach(number, flight, path, final, settings) for number, final in enumerate(finals, 1)]
     approaches = tuple(one.approach for one in told)
     answer = LandingResult(
-        approaches,
-        left_out,
-        (ACCURACY_ONLY,),
-        asdict(settings),
-        _figures(told),
+        approaches=approaches,
+        left_out=left_out,
+        remarks=(ACCURACY_ONLY,),
+        settings=asdict(settings),
+        figures=_figures(told),
     )
     return Found(answer, findings_of(answer))
 
@@ -132,7 +132,6 @@ def _figures(told: Sequence[_Told]) -> tuple[FigureData, ...]:
 def _approach(number: int, flight: "Flight", path: FlightPath, final: Final, settings: LandingSettings) -> _Told:
     runway = runway_of(path, final, settings)
     relative = relative_to_runway(path, final, runway)
-    rows = relative.rows
     height = relative.height_m[relative.is_final]
     step_m, source = _step_m(path), _source(flight, path, final)
     sensitivity = (
@@ -142,30 +141,28 @@ def _approach(number: int, flight: "Flight", path: FlightPath, final: Final, set
     protection = protection_along(flight, path.time_s[final.first], final.end.time_s, number)
     lands = final.end.outcome == "landing"
     approach = Approach(
-        number,
-        final.end.outcome,
-        float(path.time_s[final.first]),
-        final.end.time_s,
-        float(relative.distance_m[0]),
-        float(np.nanmin(height)) if np.isfinite(height).any() else None,
-        path.position_topic,
-        path.guidance_topic,
-        source,
-        path.altitude_source,
-        runway,
-        _established(path, final, relative),
-        sensitivity,
-        touchdown_of(flight, path, final, runway, relative) if lands else None,
-        stabilised(path, relative, settings),
-        errors,
-        None if protection is None else protection[0],
-        _claim(errors, runway),
-        step_m if any(step_m) else None,
-        _height_errors(flight, path, runway, final.end.time_s, settings) if lands else (),
+        number=number,
+        outcome=final.end.outcome,
+        start_s=float(path.time_s[final.first]),
+        end_s=final.end.time_s,
+        final_length_m=float(relative.distance_m[0]),
+        lowest_height_m=float(np.nanmin(height)) if np.isfinite(height).any() else None,
+        position_topic=path.position_topic,
+        guidance_topic=path.guidance_topic,
+        guidance_source=source,
+        height_source=path.altitude_source,
+        runway=runway,
+        established=_established(path, final, relative),
+        sensitivity=sensitivity,
+        touchdown=touchdown_of(flight, path, final, runway, relative) if lands else None,
+        stabilised=stabilised(path, relative, settings),
+        position_errors=errors,
+        protection=None if protection is None else protection[0],
+        claim=_claim(errors, runway),
+        position_step_m=step_m if any(step_m) else None,
+        height_errors=_height_errors(flight, path, runway, final.end.time_s, settings) if lands else (),
     )
-    return _Told(
-        approach, samples_of_final(number, path, relative, rows), None if protection is None else protection[1]
-    )
+    return _Told(approach, samples_of_final(number, path, relative), None if protection is None else protection[1])
 
 
 def _step_m(path: FlightPath) -> tuple[float, float]:
@@ -196,16 +193,16 @@ def _established(path: FlightPath, final: Final, relative: RelativeToRunway) -> 
     height = relative.height_m[own]
     vertical_m, vertical_dots = _rms(relative.vertical_guidance_m[own]), _rms(path.vertical_dots[rows])
     return Established(
-        float(path.time_s[first]),
-        float(path.time_s[last - 1]),
-        line.length_m,
-        _or_none(height[0]),
-        _or_none(height[-1]),
-        line.course_deg,
-        _rms(path.lateral_dots[rows]) or 0.0,
-        vertical_dots,
-        _rms(relative.lateral_guidance_m[own]) or 0.0,
-        vertical_m,
+        start_s=float(path.time_s[first]),
+        end_s=float(path.time_s[last - 1]),
+        length_m=line.length_m,
+        start_height_m=_or_none(height[0]),
+        end_height_m=_or_none(height[-1]),
+        line_course_deg=line.course_deg,
+        lateral_rms_dots=_rms(path.lateral_dots[rows]) or 0.0,
+        vertical_rms_dots=vertical_dots,
+        lateral_rms_m=_rms(relative.lateral_guidance_m[own]) or 0.0,
+        vertical_rms_m=vertical_m,
     )
 
 

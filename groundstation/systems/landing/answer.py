@@ -12,7 +12,7 @@ PlacedBy = Literal["site file", "positions"]
 Measured = Literal["measured", "not measured"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RunwayUsed:
     """The runway an approach is measured against.
 
@@ -44,7 +44,7 @@ class RunwayUsed:
     place_reason: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Touchdown:
     """Place, time and manner in which the wheels met the ground.
 
@@ -74,7 +74,7 @@ class Touchdown:
     rollout_course_deg: float | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Established:
     """Part of a final that was flown on the guidance, and its deviations.
 
@@ -204,7 +204,7 @@ class Sensitivity:
     samples: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Protection:
     """Protection levels of a satellite receiver along a final.
 
@@ -231,7 +231,7 @@ class Protection:
     operations: tuple[str, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Approach:
     """One approach.
 

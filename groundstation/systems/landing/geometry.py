@@ -35,7 +35,7 @@ class FittedLine:
     length_m: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class RelativeToRunway:
     """Samples of a final and its roll-out relative to runway and glide path.
 
@@ -78,19 +78,19 @@ def runway_of(path: FlightPath, final: Final, settings: LandingSettings) -> Runw
     if listed is not None and listed.latitude_deg is not None and listed.longitude_deg is not None:
         behind_m = distance_m if listed.length_m is None else max(listed.length_m + 300.0, 500.0)
         return RunwayUsed(
-            listed.name,
-            "site file",
-            listed.latitude_deg,
-            listed.longitude_deg,
-            listed.true_bearing_deg,
-            listed.sigma_deg,
-            listed.elevation_m,
-            listed.glide_angle_deg,
-            listed.threshold_crossing_height_m,
-            _given(listed.localizer_width_m, width_m),
-            _given(listed.localizer_distance_m, behind_m),
-            listed.length_m,
-            listed.width_m,
+            name=listed.name,
+            placed_by="site file",
+            latitude_deg=listed.latitude_deg,
+            longitude_deg=listed.longitude_deg,
+            true_course_deg=listed.true_bearing_deg,
+            course_sigma_deg=listed.sigma_deg,
+            elevation_m=listed.elevation_m,
+            glide_angle_deg=listed.glide_angle_deg,
+            threshold_crossing_height_m=listed.threshold_crossing_height_m,
+            localizer_width_m=_given(listed.localizer_width_m, width_m),
+            localizer_distance_m=_given(listed.localizer_distance_m, behind_m),
+            length_m=listed.length_m,
+            width_m=listed.width_m,
         )
     line = _course_line(path, final, settings)
     latitude, longitude, reason = _threshold(path, final, line, settings)
@@ -103,17 +103,17 @@ def runway_of(path: FlightPath, final: Final, settings: LandingSettings) -> Runw
 def _placed(line: FittedLine, latitude_deg: float, longitude_deg: float, settings: LandingSettings) -> RunwayUsed:
     """A runway on a line, with the aids of the settings."""
     return RunwayUsed(
-        "",
-        "positions",
-        latitude_deg,
-        longitude_deg,
-        line.course_deg,
-        0.0,
-        None,
-        settings.glide_angle_deg,
-        settings.threshold_crossing_height_m,
-        settings.localizer_width_m,
-        settings.localizer_distance_m,
+        name="",
+        placed_by="positions",
+        latitude_deg=latitude_deg,
+        longitude_deg=longitude_deg,
+        true_course_deg=line.course_deg,
+        course_sigma_deg=0.0,
+        elevation_m=None,
+        glide_angle_deg=settings.glide_angle_deg,
+        threshold_crossing_height_m=settings.threshold_crossing_height_m,
+        localizer_width_m=settings.localizer_width_m,
+        localizer_distance_m=settings.localizer_distance_m,
     )
 
 
@@ -187,16 +187,16 @@ def relative_to_runway(path: FlightPath, final: Final, runway: RunwayUsed) -> Re
     lateral_dot_m = metres_per_dot(distance_m, runway)
     vertical_dot_m = GLIDE_SLOPE_DOT * np.deg2rad(runway.glide_angle_deg) * from_origin_m
     return RelativeToRunway(
-        rows,
-        distance_m,
-        across_m,
-        height_m,
-        glide_path_height_m,
-        path.lateral_dots[rows] * lateral_dot_m,
-        np.where(is_final, path.vertical_dots[rows] * vertical_dot_m, np.nan),
-        is_final,
-        lateral_dot_m,
-        vertical_dot_m,
+        rows=rows,
+        distance_m=distance_m,
+        across_m=across_m,
+        height_m=height_m,
+        glide_path_height_m=glide_path_height_m,
+        lateral_guidance_m=path.lateral_dots[rows] * lateral_dot_m,
+        vertical_guidance_m=np.where(is_final, path.vertical_dots[rows] * vertical_dot_m, np.nan),
+        is_final=is_final,
+        lateral_dot_m=lateral_dot_m,
+        vertical_dot_m=vertical_dot_m,
     )
 
 
@@ -216,7 +216,11 @@ def along_and_across(
 
     Examples
     --------
-    >>> eastward = RunwayUsed("09", "site file", 0.0, 10.0, 90.0, 0.05, None, 3.0, 15.0, 210.0, 3300.0)
+    >>> eastward = RunwayUsed(
+    ...     name="09", placed_by="site file", latitude_deg=0.0, longitude_deg=10.0, true_course_deg=90.0,
+    ...     course_sigma_deg=0.05, elevation_m=None, glide_angle_deg=3.0, threshold_crossing_height_m=15.0,
+    ...     localizer_width_m=210.0, localizer_distance_m=3300.0,
+    ... )
     >>> [round(float(one[0])) for one in along_and_across(np.array([-0.001]), np.array([9.99]), eastward)]
     [1113, 111]
     """
@@ -239,8 +243,9 @@ def _height(path: FlightPath, final: Final, runway: RunwayUsed) -> FloatArray:
     return path.altitude_m - (float(np.median(ground_m)) if ground_m.size else np.nan)
 
 
-def samples_of_final(number: int, path: FlightPath, relative: RelativeToRunway, rows: slice) -> LandingPath:
+def samples_of_final(number: int, path: FlightPath, relative: RelativeToRunway) -> LandingPath:
     """Every sample of a final and its roll-out."""
+    rows = relative.rows
     return LandingPath(
         approach=np.full(rows.stop - rows.start, float(number)),
         time_s=path.time_s[rows],

@@ -37,16 +37,16 @@ def touchdown_of(
         course = line_through(path, slice(int(on_ground[0]), int(on_ground[-1]) + 1)).course_deg
     speed_mps = float(np.interp(at_s, path.time_s, path.ground_speed_mps))
     return Touchdown(
-        at_s,
-        final.end.sigma_s,
-        final.end.found_by,
-        latitude,
-        longitude,
-        -float(distance_m[0]) if runway.placed_by == "site file" else None,
-        speed_mps if np.isfinite(speed_mps) else None,
-        _sink_rate(flight, path, at_s),
-        _peak_load(flight, at_s),
-        course,
+        time_s=at_s,
+        time_sigma_s=final.end.sigma_s,
+        found_by=final.end.found_by,
+        latitude_deg=latitude,
+        longitude_deg=longitude,
+        past_threshold_m=-float(distance_m[0]) if runway.placed_by == "site file" else None,
+        ground_speed_mps=speed_mps if np.isfinite(speed_mps) else None,
+        sink_rate_mps=_sink_rate(flight, path, at_s),
+        peak_load_g=_peak_load(flight, at_s),
+        rollout_course_deg=course,
     )
 
 
