@@ -28,7 +28,7 @@ from groundstation.systems.landing.answer import (
 )
 from groundstation.systems.landing.arrays import LandingPath, LandingProtection
 from groundstation.systems.landing.columns import COLUMNS
-from groundstation.systems.landing.finals import Final, ends_of, final_of
+from groundstation.systems.landing.finals import End, Final, ends_of, final_of
 from groundstation.systems.landing.findings import findings_of
 from groundstation.systems.landing.geometry import (
     ROLL_OUT_MIN_MPS,
@@ -114,7 +114,8 @@ def _examine(flight: "Flight", known: Known, settings: LandingSettings) -> tuple
     def where(some: list[Final]) -> tuple[tuple[float, float], ...]:
         return tuple((float(path.time_s[one.first]), one.end.time_s) for one in some)
 
-    unlisted, unguided = ([one for one in finals if getattr(one, name) is None] for name in ("runway", "established"))
+    unlisted = [one for one in finals if one.runway is None]
+    unguided = [one for one in finals if one.guided is None]
     found = [Shortfall(f"no straight final: {one.reason}", ((one.time_s, one.time_s),)) for one in left_out]
     if unlisted:
         found.append(Shortfall("no runway of the site file: course and threshold from the positions", where(unlisted)))
@@ -152,7 +153,7 @@ def _approach(number: int, flight: "Flight", path: FlightPath, final: Final, set
         guidance_source=source,
         height_source=path.altitude_source,
         runway=runway,
-        established=_established(path, final, relative),
+        established=_guided_part(path, final, relative),
         sensitivity=sensitivity,
         touchdown=touchdown_of(flight, path, final, runway, relative) if lands else None,
         stabilised=stabilised(path, relative, settings),
@@ -183,11 +184,11 @@ def _source(flight: "Flight", path: FlightPath, final: Final) -> str:
     return name or (f"{tuned[-1]:.2f} MHz" if tuned.size else "")
 
 
-def _established(path: FlightPath, final: Final, relative: RelativeToRunway) -> Established | None:
-    if final.established is None:
+def _guided_part(path: FlightPath, final: Final, relative: RelativeToRunway) -> Established | None:
+    rows = final.guided
+    if rows is None:
         return None
-    first, last = final.established
-    rows = slice(first, last)
+    first, last = rows.start, rows.stop
     own = slice(first - relative.rows.start, last - relative.rows.start)
     line = line_through(path, rows)
     height = relative.height_m[own]
@@ -243,7 +244,8 @@ def _position_errors(
 
     Nothing where no localizer was followed.
     """
-    if final.established is None:
+    guided = final.guided
+    if guided is None:
         return ()
     if SATELLITES in source:
         reason = "guidance was by a satellite receiver, not a localizer"
@@ -251,10 +253,8 @@ def _position_errors(
     if sensitivity is not None and not fits(sensitivity):
         reason = f"positions move by {sensitivity.ratio:.2f} of what the localizer shows: no reference"
         return (PositionError(path.position_topic, "not measured", reason, 0),)
-    start_s, end_s = (float(path.time_s[row]) for row in (final.established[0], final.established[1] - 1))
     return tuple(
-        _error_of(flight, topic, path, runway, (start_s, end_s, final.end.time_s), final.end.outcome, settings)
-        for topic in position_topics(flight)
+        _error_of(flight, topic, path, runway, guided, final.end, settings) for topic in position_topics(flight)
     )
 
 
@@ -271,15 +271,16 @@ def _error_of(
     topic: str,
     path: FlightPath,
     runway: RunwayUsed,
-    times_s: tuple[float, float, float],
-    outcome: str,
+    guided: slice,
+    end: End,
     settings: LandingSettings,
 ) -> PositionError:
     """Return the error of a topic's positions on the guided part, then on the roll-out."""
     table = flight[topic].unique_times()
     time_s = flight.seconds(table.time_ns)
-    last_s = times_s[2] + (ROLL_OUT_S if outcome == "landing" else 0.0)
-    rows = table.valid("latitude_deg", "longitude_deg") & (time_s >= times_s[0]) & (time_s <= last_s)
+    guided_from_s, guided_until_s = float(path.time_s[guided.start]), float(path.time_s[guided.stop - 1])
+    last_s = end.time_s + (ROLL_OUT_S if end.outcome == "landing" else 0.0)
+    rows = table.valid("latitude_deg", "longitude_deg") & (time_s >= guided_from_s) & (time_s <= last_s)
     table, time_s = table.take(rows), time_s[rows]
     steps = (step_of(flight[topic].values("latitude_deg")),) * 2
     shift = 0.5 if settings.positions_rounded == "down" else 0.0
@@ -288,14 +289,14 @@ def _error_of(
     )
     distance_m, _across = along_and_across(latitude, longitude, runway)
     order = np.argsort(distance_m)
-    crossing_s = float(np.interp(0.0, distance_m[order], time_s[order])) if len(order) else times_s[1]
+    crossing_s = float(np.interp(0.0, distance_m[order], time_s[order])) if len(order) else guided_until_s
     speed = np.interp(time_s, path.time_s, path.ground_speed_mps)
     positions = Positions(topic, time_s - crossing_s, latitude, longitude, steps)
     return position_error(
         positions,
         np.interp(time_s, path.time_s, path.lateral_dots, left=np.nan, right=np.nan),
-        (time_s <= times_s[1]),
-        (time_s > times_s[2]) & (speed >= ROLL_OUT_MIN_MPS),
+        time_s <= guided_until_s,
+        (time_s > end.time_s) & (speed >= ROLL_OUT_MIN_MPS),
         runway,
         crossing_s,
         settings,

@@ -37,13 +37,13 @@ class End:
 class Final:
     """Samples [first, last) of a straight final.
 
-    With them come the part of it on the guidance, its course so far and its runway.
+    ``guided`` are the rows of it on the guidance, ``course_deg`` is its course so far.
     """
 
     end: End
     first: int
     last: int
-    established: tuple[int, int] | None
+    guided: slice | None
     course_deg: float
     runway: Runway | None
 
@@ -115,8 +115,8 @@ def final_of(path: FlightPath, end: End, site: SiteData, settings: LandingSettin
     reason = _too_short(path, first, last, from_end_m, end, settings)
     if reason:
         return LeftOutApproach(end.time_s, reason)
-    established = _established(path, first, last, settings)
-    return Final(end, first, last, established, course_deg, runway)
+    guided = _longest_on_guidance(path, first, last, settings)
+    return Final(end, first, last, guided, course_deg, runway)
 
 
 def _track(path: FlightPath, first: int, last: int) -> FloatArray:
@@ -181,8 +181,8 @@ def _too_short(
     return ""
 
 
-def _established(path: FlightPath, first: int, last: int, settings: LandingSettings) -> tuple[int, int] | None:
-    """The longest stretch of the final that was on the guidance."""
+def _longest_on_guidance(path: FlightPath, first: int, last: int, settings: LandingSettings) -> slice | None:
+    """Rows of the longest stretch of a final that was on the guidance."""
     rows = slice(first, last)
     found = on_guidance(path.time_s[rows], path.lateral_dots[rows], path.vertical_dots[rows], settings)
     fast = [
@@ -190,4 +190,5 @@ def _established(path: FlightPath, first: int, last: int, settings: LandingSetti
         for low, high in found
         if np.nanmedian(path.ground_speed_mps[first + low : first + high]) >= settings.speed_min_mps
     ]
-    return max(fast, key=lambda one: path.time_s[one[1] - 1] - path.time_s[one[0]], default=None)
+    longest = max(fast, key=lambda one: path.time_s[one[1] - 1] - path.time_s[one[0]], default=None)
+    return None if longest is None else slice(*longest)

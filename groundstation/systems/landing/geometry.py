@@ -125,7 +125,7 @@ def _course_line(path: FlightPath, final: Final, settings: LandingSettings) -> F
     rows = _line_rows(path, final)
     line = line_through(path, rows)
     dots = path.lateral_dots[rows]
-    if final.established is None or not np.isfinite(dots).any():
+    if final.guided is None or not np.isfinite(dots).any():
         return line
     latitude, longitude, _reason = _threshold(path, final, line, settings)
     runway = _placed(line, latitude, longitude, settings)
@@ -141,8 +141,8 @@ def _given(value: float | None, otherwise: float) -> float:
 
 def _line_rows(path: FlightPath, final: Final) -> slice:
     """Rows that the line goes through: on the guidance, else the last of the final."""
-    if final.established is not None:
-        return slice(*final.established)
+    if final.guided is not None:
+        return final.guided
     end = final.last - 1
     distance_m = np.hypot(*path.position_m(path.latitude_deg[end], path.longitude_deg[end])[final.first : final.last].T)
     return slice(final.first + int(np.argmax(distance_m <= LINE_M)), final.last)
@@ -158,7 +158,7 @@ def _threshold(path: FlightPath, final: Final, line: FittedLine, settings: Landi
     at = float(along[end]) - settings.aiming_point_m
     reason = f"{settings.aiming_point_m:.0f} m before the touchdown"
     if final.end.outcome == "go-around":
-        rows = slice(*(final.established or (final.first, final.last)))
+        rows = final.guided or slice(final.first, final.last)
         known = np.isfinite(path.altitude_m[rows])
         slope, height_m = np.polyfit(along[rows][known], path.altitude_m[rows][known], 1)
         at = float((settings.threshold_crossing_height_m - height_m) / slope) if slope < -0.01 else float(along[end])
