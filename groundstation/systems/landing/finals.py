@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 CHORD_S, LONGEST_CHORD_S = 12.0, 40.0  # over which a direction is taken
 STEPS_OF_A_CHORD = 12.0  # of the positions, where they are written in coarse ones
-GROUND_M = 1.0  # of a height that counts from the airfield
+GROUND_M, FLOWN_M = 1.0, 100.0  # of a height that counts from the airfield: on the ground below, in flight above
 AFTER_S = 60.0  # a landing so soon after the lowest point of a descent belongs to it
 CLIMB_S = 240.0
 NEAR_M = 2_000.0  # from the end, within which the course is taken
@@ -70,9 +70,9 @@ def _landings(path: FlightPath, phases: "Phases") -> tuple[End, ...]:
     height = np.where(np.isfinite(path.altitude_m), path.altitude_m, np.inf)
     is_high = False
     for row in range(1, len(height)):
-        is_high |= bool(np.isfinite(height[row]) and height[row] > 100.0)
+        is_high |= bool(np.isfinite(height[row]) and height[row] > FLOWN_M)
         if is_high and height[row] < GROUND_M:
-            found.append(End(float(path.time_s[row]), "landing", f"{path.altitude_source} below 1 m", 2.0))
+            found.append(End(float(path.time_s[row]), "landing", f"{path.altitude_source} below {GROUND_M:g} m", 2.0))
             is_high = False
     return tuple(found)
 

@@ -12,7 +12,7 @@ from groundstation.base.angles import FloatArray, direction_of
 from groundstation.base.geodesy import SEMI_MAJOR_M, latitude_longitude_deg, north_east_m
 from groundstation.base.records import BoolArray
 from groundstation.base.units import DOTS_PER_FULL_SCALE
-from groundstation.systems.landing.answer import RunwayUsed
+from groundstation.systems.landing.answer import GLIDE_SLOPE_DOT, RunwayUsed
 from groundstation.systems.landing.arrays import LandingPath
 from groundstation.systems.landing.finals import Final
 from groundstation.systems.landing.path import FlightPath
@@ -20,7 +20,6 @@ from groundstation.systems.landing.settings import LandingSettings
 
 LINE_M = 5_000.0  # of a final without guidance, the line goes through so much of its end
 VELOCITY_ERROR_MPS = 0.5  # of positions that nothing corrects: turns the line they make
-GLIDE_SLOPE_DOT = 0.12  # a dot is so much of the glide angle (ICAO Annex 10, volume I, 3.1.5.6.2)
 ROLL_OUT_S, ROLL_OUT_MIN_MPS = 40.0, 12.0
 
 

@@ -8,7 +8,7 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.geodesy import continuous_longitude_deg
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import MPS2_PER_G
-from groundstation.systems.landing.answer import RunwayUsed, Touchdown
+from groundstation.systems.landing.answer import PEAK_S, SINK_S, RunwayUsed, Touchdown
 from groundstation.systems.landing.finals import Final
 from groundstation.systems.landing.geometry import RelativeToRunway, along_and_across, line_through
 from groundstation.systems.landing.path import FlightPath, slope
@@ -16,8 +16,6 @@ from groundstation.systems.landing.path import FlightPath, slope
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight
 
-SINK_S = 3.0  # before the touchdown, over which the sink rate is taken
-PEAK_S = 2.0
 LOAD_RANGE_G = (-1.0, 4.0)  # beyond it a sample is a fault of the recorder
 SPIKE_G = 1.5  # of one sample against both its neighbours
 
