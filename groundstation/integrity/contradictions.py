@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import direction_of, wrap_180
+from groundstation.base.geodesy import METRES_PER_DEG
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.signals import kind_of
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import ClockModel
-from groundstation.integrity.stuck import METRES_PER_DEG, MotionSampler
+from groundstation.integrity.stuck import MotionSampler
 
 FloatArray = NDArray[np.float64]
 CONTRADICTION = "data.contradiction"  # code of the finding

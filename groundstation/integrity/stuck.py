@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from groundstation.base.angles import direction_of, wrap_180
+from groundstation.base.geodesy import METRES_PER_DEG
 from groundstation.base.records import Int64Array, RecordBatch
 from groundstation.base.signals import kind_of
 from groundstation.base.units import NS_PER_S
@@ -17,7 +18,6 @@ from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.limits import StuckLimits
 from groundstation.integrity.stretches import Constancy, ConstantStretch, FloatArray, Sampler
 
-METRES_PER_DEG = 111_195.0  # metres per degree of latitude on a sphere: enough for a comparison with a hundred metres
 FINE = 1.05  # samples that a value lasts, on average, where a channel is finer than its noise
 
 _ALTITUDES = ("altitude_ellipsoid_m", "altitude_msl_m", "pressure_altitude_m")

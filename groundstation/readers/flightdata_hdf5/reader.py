@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from groundstation.base.geodesy import METRES_PER_DEG
 from groundstation.base.records import MAX_BATCH_ROWS, Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.signals import RAW_PREFIX
 from groundstation.base.source_units import PREFIX, units_entry
@@ -220,7 +221,7 @@ class _Steps:
 
     def remarks(self) -> Iterator[Remark]:
         if 1e-5 < self.smallest_deg < 1.0:
-            north_m = self.smallest_deg * 111_195.0
+            north_m = self.smallest_deg * METRES_PER_DEG
             text = f"positions are written in steps of {self.smallest_deg:.8f} deg, {north_m:.0f} m of latitude"
             yield Remark("quantised", text, "ins", ("latitude_deg", "longitude_deg"))
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.errors import NotAssessableError
+from groundstation.base.geodesy import METRES_PER_DEG
 from groundstation.base.signals import topics_of_kind
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.arrays.typed import joined
@@ -27,20 +28,20 @@ from groundstation.systems.landing.answer import (
 )
 from groundstation.systems.landing.arrays import LandingPath, LandingProtection
 from groundstation.systems.landing.columns import COLUMNS
-from groundstation.systems.landing.finals import Final, ends_of, final_of
+from groundstation.systems.landing.finals import End, Final, ends_of, final_of
 from groundstation.systems.landing.findings import findings_of
 from groundstation.systems.landing.geometry import (
     ROLL_OUT_MIN_MPS,
     ROLL_OUT_S,
-    Against,
-    against,
+    RelativeToRunway,
     along_and_across,
     line_through,
-    path_columns,
+    relative_to_runway,
     runway_of,
+    samples_of_final,
 )
 from groundstation.systems.landing.height import height_error
-from groundstation.systems.landing.path import METRES_PER_DEG, FlightPath, path_of, position_topics, step_of
+from groundstation.systems.landing.path import FlightPath, path_of, position_topics, step_of
 from groundstation.systems.landing.protection import protection_along
 from groundstation.systems.landing.reference import (
     Positions,
@@ -57,7 +58,7 @@ if TYPE_CHECKING:
 
 SATELLITES = "GPS"  # as recorders name the source of guidance
 TURN_S = 180.0  # before a final, in which it is turned onto the course
-MOST_APPROACHES = 50
+MOST_ANALYSED = 50  # a log of many circuits takes no longer
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,11 +75,11 @@ def _run(flight: "Flight", known: Known, settings: LandingSettings) -> Found[Lan
     told = [_approach(number, flight, path, final, settings) for number, final in enumerate(finals, 1)]
     approaches = tuple(one.approach for one in told)
     answer = LandingResult(
-        approaches,
-        left_out,
-        (ACCURACY_ONLY,),
-        asdict(settings),
-        _figures(told),
+        approaches=approaches,
+        left_out=left_out,
+        remarks=(ACCURACY_ONLY,),
+        settings=asdict(settings),
+        figures=_figures(told),
     )
     return Found(answer, findings_of(answer))
 
@@ -97,7 +98,7 @@ def _finals(
     ends = ends_of(path, known.phases, settings)
     if not ends:
         raise NotAssessableError("landing", "no landing in the log, and no guided descent followed by a climb")
-    found = [final_of(path, end, known.site, settings) for end in ends[:MOST_APPROACHES]]
+    found = [final_of(path, end, known.site, settings) for end in ends[:MOST_ANALYSED]]
     left_out = tuple(one for one in found if isinstance(one, LeftOutApproach))
     finals = [one for one in found if isinstance(one, Final)]
     if not finals:
@@ -113,7 +114,8 @@ def _examine(flight: "Flight", known: Known, settings: LandingSettings) -> tuple
     def where(some: list[Final]) -> tuple[tuple[float, float], ...]:
         return tuple((float(path.time_s[one.first]), one.end.time_s) for one in some)
 
-    unlisted, unguided = ([one for one in finals if getattr(one, name) is None] for name in ("runway", "established"))
+    unlisted = [one for one in finals if one.runway is None]
+    unguided = [one for one in finals if one.guided is None]
     found = [Shortfall(f"no straight final: {one.reason}", ((one.time_s, one.time_s),)) for one in left_out]
     if unlisted:
         found.append(Shortfall("no runway of the site file: course and threshold from the positions", where(unlisted)))
@@ -130,37 +132,38 @@ def _figures(told: Sequence[_Told]) -> tuple[FigureData, ...]:
 
 def _approach(number: int, flight: "Flight", path: FlightPath, final: Final, settings: LandingSettings) -> _Told:
     runway = runway_of(path, final, settings)
-    near = against(path, final, runway)
-    rows = near.rows
-    height = near.height_m[near.is_final]
+    relative = relative_to_runway(path, final, runway)
+    height = relative.height_m[relative.is_final]
     step_m, source = _step_m(path), _source(flight, path, final)
-    sensitivity = _sensitivity(path, near, runway, source, float(np.hypot(*step_m))) if path.guidance_topic else None
+    sensitivity = (
+        _sensitivity(path, relative, runway, source, float(np.hypot(*step_m))) if path.guidance_topic else None
+    )
     errors = _position_errors(flight, path, final, runway, source, sensitivity, settings)
     protection = protection_along(flight, path.time_s[final.first], final.end.time_s, number)
     lands = final.end.outcome == "landing"
     approach = Approach(
-        number,
-        final.end.outcome,
-        float(path.time_s[final.first]),
-        final.end.time_s,
-        float(near.distance_m[0]),
-        float(np.nanmin(height)) if np.isfinite(height).any() else None,
-        path.position_topic,
-        path.guidance_topic,
-        source,
-        path.altitude_source,
-        runway,
-        _established(path, final, near),
-        sensitivity,
-        touchdown_of(flight, path, final, runway, near) if lands else None,
-        stabilised(path, near, settings),
-        errors,
-        None if protection is None else protection[0],
-        _claim(errors, runway),
-        step_m if any(step_m) else None,
-        _height_errors(flight, path, runway, final.end.time_s, settings) if lands else (),
+        number=number,
+        outcome=final.end.outcome,
+        start_s=float(path.time_s[final.first]),
+        end_s=final.end.time_s,
+        final_length_m=float(relative.distance_m[0]),
+        lowest_height_m=float(np.nanmin(height)) if np.isfinite(height).any() else None,
+        position_topic=path.position_topic,
+        guidance_topic=path.guidance_topic,
+        guidance_source=source,
+        height_source=path.altitude_source,
+        runway=runway,
+        established=_guided_part(path, final, relative),
+        sensitivity=sensitivity,
+        touchdown=touchdown_of(flight, path, final, runway, relative) if lands else None,
+        stabilised=stabilised(path, relative, settings),
+        position_errors=errors,
+        protection=None if protection is None else protection[0],
+        claim=_claim(errors, runway),
+        position_step_m=step_m if any(step_m) else None,
+        height_errors=_height_errors(flight, path, runway, final.end.time_s, settings) if lands else (),
     )
-    return _Told(approach, path_columns(number, path, near, rows), None if protection is None else protection[1])
+    return _Told(approach, samples_of_final(number, path, relative), None if protection is None else protection[1])
 
 
 def _step_m(path: FlightPath) -> tuple[float, float]:
@@ -181,26 +184,26 @@ def _source(flight: "Flight", path: FlightPath, final: Final) -> str:
     return name or (f"{tuned[-1]:.2f} MHz" if tuned.size else "")
 
 
-def _established(path: FlightPath, final: Final, near: Against) -> Established | None:
-    if final.established is None:
+def _guided_part(path: FlightPath, final: Final, relative: RelativeToRunway) -> Established | None:
+    rows = final.guided
+    if rows is None:
         return None
-    first, last = final.established
-    rows = slice(first, last)
-    own = slice(first - near.rows.start, last - near.rows.start)
+    first, last = rows.start, rows.stop
+    own = slice(first - relative.rows.start, last - relative.rows.start)
     line = line_through(path, rows)
-    height = near.height_m[own]
-    vertical_m, vertical_dots = _rms(near.vertical_guidance_m[own]), _rms(path.vertical_dots[rows])
+    height = relative.height_m[own]
+    vertical_m, vertical_dots = _rms(relative.vertical_guidance_m[own]), _rms(path.vertical_dots[rows])
     return Established(
-        float(path.time_s[first]),
-        float(path.time_s[last - 1]),
-        line.length_m,
-        _or_none(height[0]),
-        _or_none(height[-1]),
-        line.course_deg,
-        _rms(path.lateral_dots[rows]) or 0.0,
-        vertical_dots,
-        _rms(near.lateral_guidance_m[own]) or 0.0,
-        vertical_m,
+        start_s=float(path.time_s[first]),
+        end_s=float(path.time_s[last - 1]),
+        length_m=line.length_m,
+        start_height_m=_or_none(height[0]),
+        end_height_m=_or_none(height[-1]),
+        line_course_deg=line.course_deg,
+        lateral_rms_dots=_rms(path.lateral_dots[rows]) or 0.0,
+        vertical_rms_dots=vertical_dots,
+        lateral_rms_m=_rms(relative.lateral_guidance_m[own]) or 0.0,
+        vertical_rms_m=vertical_m,
     )
 
 
@@ -213,13 +216,15 @@ def _rms(values: FloatArray) -> float | None:
     return float(np.sqrt(np.mean(known**2))) if known.size else None
 
 
-def _sensitivity(path: FlightPath, near: Against, runway: RunwayUsed, source: str, step_m: float) -> Sensitivity:
+def _sensitivity(
+    path: FlightPath, relative: RelativeToRunway, runway: RunwayUsed, source: str, step_m: float
+) -> Sensitivity:
     """Estimate the localizer's sensitivity on the final and the turn onto it.
 
     The final alone has few deviations. Satellite guidance is judged on the final only.
     """
-    last = near.rows.start + int(np.count_nonzero(near.is_final))
-    first = near.rows.start
+    last = relative.rows.start + int(np.count_nonzero(relative.is_final))
+    first = relative.rows.start
     if SATELLITES not in source:  # which guides along the leg before, until the turn is made
         first = int(np.searchsorted(path.time_s, path.time_s[first] - TURN_S))
     distance_m, across_m = along_and_across(path.latitude_deg[first:last], path.longitude_deg[first:last], runway)
@@ -239,7 +244,8 @@ def _position_errors(
 
     Nothing where no localizer was followed.
     """
-    if final.established is None:
+    guided = final.guided
+    if guided is None:
         return ()
     if SATELLITES in source:
         reason = "guidance was by a satellite receiver, not a localizer"
@@ -247,10 +253,8 @@ def _position_errors(
     if sensitivity is not None and not fits(sensitivity):
         reason = f"positions move by {sensitivity.ratio:.2f} of what the localizer shows: no reference"
         return (PositionError(path.position_topic, "not measured", reason, 0),)
-    start_s, end_s = (float(path.time_s[row]) for row in (final.established[0], final.established[1] - 1))
     return tuple(
-        _error_of(flight, topic, path, runway, (start_s, end_s, final.end.time_s), final.end.outcome, settings)
-        for topic in position_topics(flight)
+        _error_of(flight, topic, path, runway, guided, final.end, settings) for topic in position_topics(flight)
     )
 
 
@@ -267,15 +271,16 @@ def _error_of(
     topic: str,
     path: FlightPath,
     runway: RunwayUsed,
-    times_s: tuple[float, float, float],
-    outcome: str,
+    guided: slice,
+    end: End,
     settings: LandingSettings,
 ) -> PositionError:
     """Return the error of a topic's positions on the guided part, then on the roll-out."""
     table = flight[topic].unique_times()
     time_s = flight.seconds(table.time_ns)
-    last_s = times_s[2] + (ROLL_OUT_S if outcome == "landing" else 0.0)
-    rows = table.valid("latitude_deg", "longitude_deg") & (time_s >= times_s[0]) & (time_s <= last_s)
+    guided_from_s, guided_until_s = float(path.time_s[guided.start]), float(path.time_s[guided.stop - 1])
+    last_s = end.time_s + (ROLL_OUT_S if end.outcome == "landing" else 0.0)
+    rows = table.valid("latitude_deg", "longitude_deg") & (time_s >= guided_from_s) & (time_s <= last_s)
     table, time_s = table.take(rows), time_s[rows]
     steps = (step_of(flight[topic].values("latitude_deg")),) * 2
     shift = 0.5 if settings.positions_rounded == "down" else 0.0
@@ -284,14 +289,14 @@ def _error_of(
     )
     distance_m, _across = along_and_across(latitude, longitude, runway)
     order = np.argsort(distance_m)
-    crossing_s = float(np.interp(0.0, distance_m[order], time_s[order])) if len(order) else times_s[1]
+    crossing_s = float(np.interp(0.0, distance_m[order], time_s[order])) if len(order) else guided_until_s
     speed = np.interp(time_s, path.time_s, path.ground_speed_mps)
     positions = Positions(topic, time_s - crossing_s, latitude, longitude, steps)
     return position_error(
         positions,
         np.interp(time_s, path.time_s, path.lateral_dots, left=np.nan, right=np.nan),
-        (time_s <= times_s[1]),
-        (time_s > times_s[2]) & (speed >= ROLL_OUT_MIN_MPS),
+        time_s <= guided_until_s,
+        (time_s > end.time_s) & (speed >= ROLL_OUT_MIN_MPS),
         runway,
         crossing_s,
         settings,

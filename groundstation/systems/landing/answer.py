@@ -10,9 +10,12 @@ from groundstation.results.gates import Gate
 Outcome = Literal["landing", "go-around"]
 PlacedBy = Literal["site file", "positions"]
 Measured = Literal["measured", "not measured"]
+GLIDE_SLOPE_DOT = 0.12  # a dot is so much of the glide angle (ICAO Annex 10, volume I, 3.1.5.6.2)
+SINK_S = 3.0  # before the touchdown, over which the sink rate is taken
+PEAK_S = 2.0  # about the touchdown, within which the peak load is sought
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RunwayUsed:
     """The runway an approach is measured against.
 
@@ -44,7 +47,7 @@ class RunwayUsed:
     place_reason: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Touchdown:
     """Place, time and manner in which the wheels met the ground.
 
@@ -55,9 +58,9 @@ class Touchdown:
     past_threshold_m : float or None
         Along the runway; None where the threshold itself was placed by the touchdown.
     sink_rate_mps : float or None
-        Over the last seconds before it.
+        Over the last ``SINK_S`` before it.
     peak_load_g : float or None
-        Greatest normal acceleration around it.
+        Greatest normal acceleration within ``PEAK_S`` of it.
     rollout_course_deg : float or None
         True direction of the line through the positions of the roll-out.
     """
@@ -74,7 +77,7 @@ class Touchdown:
     rollout_course_deg: float | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Established:
     """Part of a final that was flown on the guidance, and its deviations.
 
@@ -98,7 +101,11 @@ StabilisedVerdict = Literal["stabilised", "not stabilised", "not measured"]
 
 @dataclass(frozen=True)
 class StabilisedAt:
-    """Criteria of a stabilised approach, from a height down to the start of the flare."""
+    """Criteria of a stabilised approach, from a check height down to the start of the flare.
+
+    ``gates`` are the criteria; without any, ``reason`` says why none was measured. Criteria that are not in the log
+    leave the verdict to the others: it is stabilised if any was met and none failed.
+    """
 
     height_m: float
     verdict: StabilisedVerdict
@@ -204,7 +211,7 @@ class Sensitivity:
     samples: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Protection:
     """Protection levels of a satellite receiver along a final.
 
@@ -231,7 +238,7 @@ class Protection:
     operations: tuple[str, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Approach:
     """One approach.
 

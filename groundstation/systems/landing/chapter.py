@@ -3,6 +3,7 @@
 How each was flown, where it touched down, and what shows accuracy.
 """
 
+from groundstation.base.units import DOTS_PER_FULL_SCALE
 from groundstation.chapters.chapter import Remedies
 from groundstation.chapters.gates import limit_text, setting_facts, state_of
 from groundstation.chapters.parts import (
@@ -34,7 +35,16 @@ from groundstation.chapters.wording import (
     unit_sign,
 )
 from groundstation.results.flight import FlightResults
-from groundstation.systems.landing.answer import Approach, HeightError, LandingResult, PositionError, StabilisedAt
+from groundstation.systems.landing.answer import (
+    GLIDE_SLOPE_DOT,
+    PEAK_S,
+    SINK_S,
+    Approach,
+    HeightError,
+    LandingResult,
+    PositionError,
+    StabilisedAt,
+)
 
 LEAD = "How each approach was flown against its runway, and where it touched down."
 SOURCES = (
@@ -46,12 +56,14 @@ TITLE = "Approaches"
 NOT_STABILISED, NOT_MEASURED = "not stabilised", "not measured"
 TONES: dict[str, Tone] = {"stabilised": "good", NOT_STABILISED: "warn", NOT_MEASURED: "unknown"}
 MOST_TOLD = 6
+SINK_TIME = f"over the last {SINK_S:g} s"
+PEAK_TIME = f"within {PEAK_S:g} s, spikes of single samples left out"
 HOW = (
     "How computed: a final leads straight to a touchdown, or follows the guidance down to a height where a climb "
-    "begins. Deviations are converted to metres by the course sector (two dots to its edge) and by 0.12 of the glide "
-    "angle per dot. If runway and localizer are known, position minus localizer is the error across the course, "
-    "without GNSS: generalised least squares, with tolerances of course line, bends, width, steps and runway bearing "
-    "in the covariance."
+    f"begins. Deviations are converted to metres by the course sector ({DOTS_PER_FULL_SCALE:g} dots to its edge) and "
+    f"by {GLIDE_SLOPE_DOT:g} of the glide angle per dot. If runway and localizer are known, position minus localizer "
+    "is the error across the course, without GNSS: generalised least squares, with tolerances of course line, bends, "
+    "width, steps and runway bearing in the covariance."
 )
 REMEDIES: Remedies = (("no position of the aircraft", ("Record", "positions")),)
 
@@ -64,7 +76,7 @@ def landing(results: FlightResults) -> Section | None:
     told = answer.approaches[:MOST_TOLD]
     parts: list[Part | None] = [_overview(answer)]
     for one in told:
-        parts += _approach(one)
+        parts += _approach(one, answer)
     if len(answer.approaches) > MOST_TOLD:
         parts.append(Note(f"Approaches {MOST_TOLD + 1} to {len(answer.approaches)} are only in the table above."))
     parts += [_left_out(answer), *(Note(sentence(remark)) for remark in answer.remarks)]
@@ -98,14 +110,19 @@ def _claim(answer: LandingResult) -> Claim | None:
 
 
 def _why(one: Approach) -> str:
-    """Return the verdict of each gate height, with the criteria that failed."""
-    told = []
-    for at in one.stabilised:
-        failed = [gate.title for gate in at.gates if gate.state == "failed"]
-        height = number(at.height_m, 0, "m")
-        why = f" ({', '.join(failed)})" if failed else ""
-        told.append(f"From {height}: {at.verdict}{why}.")
-    return " ".join(told) or "No gate height was passed."
+    """Return the verdict from each check height down, with what it rests on."""
+    return " ".join(f"From {number(at.height_m, 0, 'm')}: {at.verdict}{_rests_on(at)}." for at in one.stabilised)
+
+
+def _rests_on(at: StabilisedAt) -> str:
+    """Return the criteria that failed, how many were judged where not all were, or why none was."""
+    failed = [criterion.title for criterion in at.gates if criterion.state == "failed"]
+    judged = sum(criterion.state != "not_measured" for criterion in at.gates)
+    if failed:
+        return f" ({', '.join(failed)})"
+    if not judged:
+        return f" ({typeset(at.reason) or 'no criterion is in the log'})"
+    return f" ({judged} of {len(at.gates)} criteria judged)" if judged < len(at.gates) else ""
 
 
 def _figures(one: Approach) -> tuple[tuple[str, str, str], ...]:
@@ -114,7 +131,7 @@ def _figures(one: Approach) -> tuple[tuple[str, str, str], ...]:
     found = (
         ("Off the course", number(on.lateral_rms_dots, 2, "dot") if on else ABSENT, "RMS while established"),
         ("Off the path", number(on.vertical_rms_dots, 2, "dot") if on else ABSENT, "RMS while established"),
-        ("Sink rate at touchdown", number(down.sink_rate_mps, 1, "m/s") if down else ABSENT, "over the last 3 s"),
+        ("Sink rate at touchdown", number(down.sink_rate_mps, 1, "m/s") if down else ABSENT, SINK_TIME),
         (
             "Positions across the course",
             number(error.error_m, 0, "m", signed=True) if error else ABSENT,
@@ -138,7 +155,7 @@ def _course(one: Approach) -> str:
 
 
 def _verdict(one: Approach) -> Mark:
-    """Return the worst of both gates."""
+    """Return the worse of the verdicts from both check heights."""
     verdicts = [row.verdict for row in one.stabilised]
     worst = next((word for word in (NOT_STABILISED, "stabilised") if word in verdicts), NOT_MEASURED)
     return Mark(TONES[worst], worst)
@@ -147,11 +164,15 @@ def _verdict(one: Approach) -> Mark:
 def _overview(answer: LandingResult) -> Grid:
     titles = ("Straight for, km", "Lateral RMS, dot", "Vertical RMS, dot", "Touchdown, m/s down", "Peak, g")
     heads = (
-        *(Head(title) for title in ("", "Approach", "Flight time", "Guidance", "From the gates")),
+        *(Head(title) for title in ("", "Approach", "Flight time", "Guidance", "From the check heights")),
         *(Head(title, True) for title in titles),
     )
+    lateral, vertical = (
+        significant(answer.settings.get(f"established_{axis}_dots")) for axis in ("lateral", "vertical")
+    )
     caption = (
-        "RMS of the guidance deviations while established: within half a dot of the course and one dot of the path."
+        f"RMS of the guidance deviations while established: within {lateral} dot of the course and {vertical} dot of "
+        "the path."
     )
     return Grid("Approaches", heads, [_row(one) for one in answer.approaches], caption, ("landing_path",))
 
@@ -172,13 +193,13 @@ def _row(one: Approach) -> tuple[Cell, ...]:
     )
 
 
-def _approach(one: Approach) -> list[Part | None]:
+def _approach(one: Approach, answer: LandingResult) -> list[Part | None]:
     of = str(one.number)
     return [
         Note(f"Approach {one.number}, {_name(one)}. {_told(one)}"),
         Figure("landing.deviations", of),
         Figure("landing.final", of),
-        _gates(one),
+        _criteria(one, answer.settings.get("gate_floor_m")),
         _touchdown(one),
         *(_error(one, error) for error in one.position_errors),
         *(_height(one, error) for error in one.height_errors),
@@ -209,32 +230,32 @@ def _accuracy(error: PositionError) -> str:
     return f"Error of {error.topic} across the course not measured: {typeset(error.reason)}."
 
 
-def _gates(one: Approach) -> Grid | None:
-    rows = [row for at in one.stabilised for row in _gate_rows(at)]
+def _criteria(one: Approach, floor_m: float | str | bool | None) -> Grid | None:
+    rows = [row for at in one.stabilised for row in _criterion_rows(at)]
     if not rows:
         return None
     heads = (Head("From"), Head("State"), Head("Criterion"), Head("Worst", True), Head("Limit", True), Head("Reason"))
     caption = (
-        "Worst value from the gate height down to 30 m. Limits: FSF ALAR Briefing Note 7.1 (deviations, sink rate, "
-        "speed), Airbus Flight Operations Briefing Notes (bank)."
+        f"Worst value from the check height down to {number(floor_m, 0, 'm')}. Limits: FSF ALAR Briefing Note 7.1 "
+        "(deviations, sink rate, speed), Airbus Flight Operations Briefing Notes (bank)."
     )
     return Grid(f"Approach {one.number}: stabilised?", heads, rows, caption)
 
 
-def _gate_rows(at: StabilisedAt) -> list[tuple[Cell, ...]]:
+def _criterion_rows(at: StabilisedAt) -> list[tuple[Cell, ...]]:
     height = number(at.height_m, 0, "m")
     if not at.gates:
         return [(height, Mark("unknown", "not measured"), "", ABSENT, ABSENT, sentence(at.reason))]
     return [
         (
             height,
-            state_of(gate),
-            gate.title[:1].upper() + gate.title[1:],
-            number_with_unit(significant(gate.value, 3), unit_sign(gate.unit)),
-            limit_text(gate),
-            typeset(gate.reason),
+            state_of(criterion),
+            criterion.title[:1].upper() + criterion.title[1:],
+            number_with_unit(significant(criterion.value, 3), unit_sign(criterion.unit)),
+            limit_text(criterion),
+            typeset(criterion.reason),
         )
-        for gate in at.gates
+        for criterion in at.gates
     ]
 
 
@@ -247,8 +268,8 @@ def _touchdown(one: Approach) -> Facts | None:
         ("Place", f"{number(down.latitude_deg, 5, '°')}, {number(down.longitude_deg, 5, '°')}", "as recorded"),
         ("Beyond the threshold", number(down.past_threshold_m, 0, "m"), typeset(one.runway.place_reason)),
         ("Ground speed", number(down.ground_speed_mps, 1, "m/s"), ""),
-        ("Sink rate", number(down.sink_rate_mps, 2, "m/s"), "over the last 3 s"),
-        ("Peak normal acceleration", number(down.peak_load_g, 2, "g"), "within 2 s, spikes of single samples left out"),
+        ("Sink rate", number(down.sink_rate_mps, 2, "m/s"), SINK_TIME),
+        ("Peak normal acceleration", number(down.peak_load_g, 2, "g"), PEAK_TIME),
         ("Course of the roll-out", number(down.rollout_course_deg, 1, "°"), "line through its positions, true"),
     ]
     return Facts(f"Approach {one.number}: touchdown", tuple(pairs))

@@ -46,8 +46,8 @@ def _height(value: Callable[[HeightError], float | None]) -> Callable[[LandingRe
     return _last(of_approach)
 
 
-def _at_the_low_gate(one: Approach) -> str | None:
-    return min(one.stabilised, key=lambda row: row.height_m).verdict if one.stabilised else None
+def _at_the_low_check(one: Approach) -> str:
+    return min(one.stabilised, key=lambda row: row.height_m).verdict
 
 
 COLUMNS: tuple[AnswerColumn[LandingResult], ...] = (
@@ -59,7 +59,10 @@ COLUMNS: tuple[AnswerColumn[LandingResult], ...] = (
         lambda landing: sum(one.outcome == "go-around" for one in landing.approaches),
     ),
     AnswerColumn(
-        "landing_stabilised", "category", "the last approach from the lower height down", _last(_at_the_low_gate)
+        "landing_stabilised",
+        "category",
+        "the last approach from the lower check height down, by those criteria that the log has",
+        _last(_at_the_low_check),
     ),
     AnswerColumn(
         "landing_lateral_rms_dots",

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from groundstation.base.angles import FloatArray, direction_of, wrap_180
-from groundstation.base.geodesy import north_east_m
+from groundstation.base.geodesy import METRES_PER_DEG, north_east_m
 from groundstation.systems.known import Runway, SiteData
 from groundstation.systems.landing.answer import LeftOutApproach, Outcome
-from groundstation.systems.landing.path import METRES_PER_DEG, FlightPath, on_guidance, step_of
+from groundstation.systems.landing.path import FlightPath, on_guidance, step_of
 from groundstation.systems.landing.settings import LandingSettings
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 CHORD_S, LONGEST_CHORD_S = 12.0, 40.0  # over which a direction is taken
 STEPS_OF_A_CHORD = 12.0  # of the positions, where they are written in coarse ones
-GROUND_M = 1.0  # of a height that counts from the airfield
+GROUND_M, FLOWN_M = 1.0, 100.0  # of a height that counts from the airfield: on the ground below, in flight above
 AFTER_S = 60.0  # a landing so soon after the lowest point of a descent belongs to it
 CLIMB_S = 240.0
 NEAR_M = 2_000.0  # from the end, within which the course is taken
@@ -37,13 +37,13 @@ class End:
 class Final:
     """Samples [first, last) of a straight final.
 
-    With them come the part of it on the guidance, its course so far and its runway.
+    ``guided`` are the rows of it on the guidance, ``course_deg`` is its course so far.
     """
 
     end: End
     first: int
     last: int
-    established: tuple[int, int] | None
+    guided: slice | None
     course_deg: float
     runway: Runway | None
 
@@ -70,9 +70,9 @@ def _landings(path: FlightPath, phases: "Phases") -> tuple[End, ...]:
     height = np.where(np.isfinite(path.altitude_m), path.altitude_m, np.inf)
     is_high = False
     for row in range(1, len(height)):
-        is_high |= bool(np.isfinite(height[row]) and height[row] > 100.0)
+        is_high |= bool(np.isfinite(height[row]) and height[row] > FLOWN_M)
         if is_high and height[row] < GROUND_M:
-            found.append(End(float(path.time_s[row]), "landing", f"{path.altitude_source} below 1 m", 2.0))
+            found.append(End(float(path.time_s[row]), "landing", f"{path.altitude_source} below {GROUND_M:g} m", 2.0))
             is_high = False
     return tuple(found)
 
@@ -115,8 +115,8 @@ def final_of(path: FlightPath, end: End, site: SiteData, settings: LandingSettin
     reason = _too_short(path, first, last, from_end_m, end, settings)
     if reason:
         return LeftOutApproach(end.time_s, reason)
-    established = _established(path, first, last, settings)
-    return Final(end, first, last, established, course_deg, runway)
+    guided = _longest_on_guidance(path, first, last, settings)
+    return Final(end, first, last, guided, course_deg, runway)
 
 
 def _track(path: FlightPath, first: int, last: int) -> FloatArray:
@@ -181,8 +181,8 @@ def _too_short(
     return ""
 
 
-def _established(path: FlightPath, first: int, last: int, settings: LandingSettings) -> tuple[int, int] | None:
-    """The longest stretch of the final that was on the guidance."""
+def _longest_on_guidance(path: FlightPath, first: int, last: int, settings: LandingSettings) -> slice | None:
+    """Rows of the longest stretch of a final that was on the guidance."""
     rows = slice(first, last)
     found = on_guidance(path.time_s[rows], path.lateral_dots[rows], path.vertical_dots[rows], settings)
     fast = [
@@ -190,4 +190,5 @@ def _established(path: FlightPath, first: int, last: int, settings: LandingSetti
         for low, high in found
         if np.nanmedian(path.ground_speed_mps[first + low : first + high]) >= settings.speed_min_mps
     ]
-    return max(fast, key=lambda one: path.time_s[one[1] - 1] - path.time_s[one[0]], default=None)
+    longest = max(fast, key=lambda one: path.time_s[one[1] - 1] - path.time_s[one[0]], default=None)
+    return None if longest is None else slice(*longest)

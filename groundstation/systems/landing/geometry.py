@@ -1,7 +1,7 @@
-"""The runway of a final, and where the aircraft was against its path.
+"""The runway of a final, and where the aircraft was relative to it and to its glide path.
 
 Distances are along the runway, positive before the threshold; across, right of the course is positive; errors and
-deviations are aircraft minus path.
+deviations are aircraft minus glide path.
 """
 
 from dataclasses import dataclass, replace
@@ -12,7 +12,7 @@ from groundstation.base.angles import FloatArray, direction_of
 from groundstation.base.geodesy import SEMI_MAJOR_M, latitude_longitude_deg, north_east_m
 from groundstation.base.records import BoolArray
 from groundstation.base.units import DOTS_PER_FULL_SCALE
-from groundstation.systems.landing.answer import RunwayUsed
+from groundstation.systems.landing.answer import GLIDE_SLOPE_DOT, RunwayUsed
 from groundstation.systems.landing.arrays import LandingPath
 from groundstation.systems.landing.finals import Final
 from groundstation.systems.landing.path import FlightPath
@@ -20,7 +20,6 @@ from groundstation.systems.landing.settings import LandingSettings
 
 LINE_M = 5_000.0  # of a final without guidance, the line goes through so much of its end
 VELOCITY_ERROR_MPS = 0.5  # of positions that nothing corrects: turns the line they make
-GLIDE_SLOPE_DOT = 0.12  # a dot is so much of the glide angle (ICAO Annex 10, volume I, 3.1.5.6.2)
 ROLL_OUT_S, ROLL_OUT_MIN_MPS = 40.0, 12.0
 
 
@@ -35,15 +34,18 @@ class FittedLine:
     length_m: float
 
 
-@dataclass(frozen=True, eq=False)
-class Against:
-    """Samples of a final and its roll-out against the path, shape (n,), NaN where not known."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RelativeToRunway:
+    """Samples of a final and its roll-out relative to runway and glide path.
+
+    Arrays have shape (n,), NaN where not known.
+    """
 
     rows: slice
     distance_m: FloatArray
     across_m: FloatArray
     height_m: FloatArray
-    path_height_m: FloatArray
+    glide_path_height_m: FloatArray
     lateral_guidance_m: FloatArray
     vertical_guidance_m: FloatArray
     is_final: BoolArray
@@ -75,19 +77,19 @@ def runway_of(path: FlightPath, final: Final, settings: LandingSettings) -> Runw
     if listed is not None and listed.latitude_deg is not None and listed.longitude_deg is not None:
         behind_m = distance_m if listed.length_m is None else max(listed.length_m + 300.0, 500.0)
         return RunwayUsed(
-            listed.name,
-            "site file",
-            listed.latitude_deg,
-            listed.longitude_deg,
-            listed.true_bearing_deg,
-            listed.sigma_deg,
-            listed.elevation_m,
-            listed.glide_angle_deg,
-            listed.threshold_crossing_height_m,
-            _given(listed.localizer_width_m, width_m),
-            _given(listed.localizer_distance_m, behind_m),
-            listed.length_m,
-            listed.width_m,
+            name=listed.name,
+            placed_by="site file",
+            latitude_deg=listed.latitude_deg,
+            longitude_deg=listed.longitude_deg,
+            true_course_deg=listed.true_bearing_deg,
+            course_sigma_deg=listed.sigma_deg,
+            elevation_m=listed.elevation_m,
+            glide_angle_deg=listed.glide_angle_deg,
+            threshold_crossing_height_m=listed.threshold_crossing_height_m,
+            localizer_width_m=_given(listed.localizer_width_m, width_m),
+            localizer_distance_m=_given(listed.localizer_distance_m, behind_m),
+            length_m=listed.length_m,
+            width_m=listed.width_m,
         )
     line = _course_line(path, final, settings)
     latitude, longitude, reason = _threshold(path, final, line, settings)
@@ -100,17 +102,17 @@ def runway_of(path: FlightPath, final: Final, settings: LandingSettings) -> Runw
 def _placed(line: FittedLine, latitude_deg: float, longitude_deg: float, settings: LandingSettings) -> RunwayUsed:
     """A runway on a line, with the aids of the settings."""
     return RunwayUsed(
-        "",
-        "positions",
-        latitude_deg,
-        longitude_deg,
-        line.course_deg,
-        0.0,
-        None,
-        settings.glide_angle_deg,
-        settings.threshold_crossing_height_m,
-        settings.localizer_width_m,
-        settings.localizer_distance_m,
+        name="",
+        placed_by="positions",
+        latitude_deg=latitude_deg,
+        longitude_deg=longitude_deg,
+        true_course_deg=line.course_deg,
+        course_sigma_deg=0.0,
+        elevation_m=None,
+        glide_angle_deg=settings.glide_angle_deg,
+        threshold_crossing_height_m=settings.threshold_crossing_height_m,
+        localizer_width_m=settings.localizer_width_m,
+        localizer_distance_m=settings.localizer_distance_m,
     )
 
 
@@ -122,7 +124,7 @@ def _course_line(path: FlightPath, final: Final, settings: LandingSettings) -> F
     rows = _line_rows(path, final)
     line = line_through(path, rows)
     dots = path.lateral_dots[rows]
-    if final.established is None or not np.isfinite(dots).any():
+    if final.guided is None or not np.isfinite(dots).any():
         return line
     latitude, longitude, _reason = _threshold(path, final, line, settings)
     runway = _placed(line, latitude, longitude, settings)
@@ -138,8 +140,8 @@ def _given(value: float | None, otherwise: float) -> float:
 
 def _line_rows(path: FlightPath, final: Final) -> slice:
     """Rows that the line goes through: on the guidance, else the last of the final."""
-    if final.established is not None:
-        return slice(*final.established)
+    if final.guided is not None:
+        return final.guided
     end = final.last - 1
     distance_m = np.hypot(*path.position_m(path.latitude_deg[end], path.longitude_deg[end])[final.first : final.last].T)
     return slice(final.first + int(np.argmax(distance_m <= LINE_M)), final.last)
@@ -155,7 +157,7 @@ def _threshold(path: FlightPath, final: Final, line: FittedLine, settings: Landi
     at = float(along[end]) - settings.aiming_point_m
     reason = f"{settings.aiming_point_m:.0f} m before the touchdown"
     if final.end.outcome == "go-around":
-        rows = slice(*(final.established or (final.first, final.last)))
+        rows = final.guided or slice(final.first, final.last)
         known = np.isfinite(path.altitude_m[rows])
         slope, height_m = np.polyfit(along[rows][known], path.altitude_m[rows][known], 1)
         at = float((settings.threshold_crossing_height_m - height_m) / slope) if slope < -0.01 else float(along[end])
@@ -166,8 +168,8 @@ def _threshold(path: FlightPath, final: Final, line: FittedLine, settings: Landi
     return float(latitude), float(longitude), reason
 
 
-def against(path: FlightPath, final: Final, runway: RunwayUsed) -> Against:
-    """Compare a final and its roll-out with the path of the runway."""
+def relative_to_runway(path: FlightPath, final: Final, runway: RunwayUsed) -> RelativeToRunway:
+    """Compare a final and its roll-out with runway and glide path."""
     last = final.last
     if final.end.outcome == "landing":
         rolls = (path.time_s <= final.end.time_s + ROLL_OUT_S) & ~(path.ground_speed_mps < ROLL_OUT_MIN_MPS)
@@ -178,22 +180,22 @@ def against(path: FlightPath, final: Final, runway: RunwayUsed) -> Against:
     height_m = _height(path, final, runway)[rows]
     slope = np.tan(np.deg2rad(runway.glide_angle_deg))
     curved_m = distance_m**2 / (2.0 * SEMI_MAJOR_M) * np.sign(distance_m)
-    path_height_m = runway.threshold_crossing_height_m + distance_m * slope + curved_m
+    glide_path_height_m = runway.threshold_crossing_height_m + distance_m * slope + curved_m
     from_origin_m = np.clip(distance_m + runway.threshold_crossing_height_m / slope, 0.0, None)
     is_final = np.arange(rows.start, rows.stop) < final.last
     lateral_dot_m = metres_per_dot(distance_m, runway)
     vertical_dot_m = GLIDE_SLOPE_DOT * np.deg2rad(runway.glide_angle_deg) * from_origin_m
-    return Against(
-        rows,
-        distance_m,
-        across_m,
-        height_m,
-        path_height_m,
-        path.lateral_dots[rows] * lateral_dot_m,
-        np.where(is_final, path.vertical_dots[rows] * vertical_dot_m, np.nan),
-        is_final,
-        lateral_dot_m,
-        vertical_dot_m,
+    return RelativeToRunway(
+        rows=rows,
+        distance_m=distance_m,
+        across_m=across_m,
+        height_m=height_m,
+        glide_path_height_m=glide_path_height_m,
+        lateral_guidance_m=path.lateral_dots[rows] * lateral_dot_m,
+        vertical_guidance_m=np.where(is_final, path.vertical_dots[rows] * vertical_dot_m, np.nan),
+        is_final=is_final,
+        lateral_dot_m=lateral_dot_m,
+        vertical_dot_m=vertical_dot_m,
     )
 
 
@@ -213,7 +215,11 @@ def along_and_across(
 
     Examples
     --------
-    >>> eastward = RunwayUsed("09", "site file", 0.0, 10.0, 90.0, 0.05, None, 3.0, 15.0, 210.0, 3300.0)
+    >>> eastward = RunwayUsed(
+    ...     name="09", placed_by="site file", latitude_deg=0.0, longitude_deg=10.0, true_course_deg=90.0,
+    ...     course_sigma_deg=0.05, elevation_m=None, glide_angle_deg=3.0, threshold_crossing_height_m=15.0,
+    ...     localizer_width_m=210.0, localizer_distance_m=3300.0,
+    ... )
     >>> [round(float(one[0])) for one in along_and_across(np.array([-0.001]), np.array([9.99]), eastward)]
     [1113, 111]
     """
@@ -236,19 +242,20 @@ def _height(path: FlightPath, final: Final, runway: RunwayUsed) -> FloatArray:
     return path.altitude_m - (float(np.median(ground_m)) if ground_m.size else np.nan)
 
 
-def path_columns(number: int, path: FlightPath, near: Against, rows: slice) -> LandingPath:
+def samples_of_final(number: int, path: FlightPath, relative: RelativeToRunway) -> LandingPath:
     """Every sample of a final and its roll-out."""
+    rows = relative.rows
     return LandingPath(
         approach=np.full(rows.stop - rows.start, float(number)),
         time_s=path.time_s[rows],
-        distance_m=near.distance_m,
-        across_m=near.across_m,
-        height_m=near.height_m,
-        path_height_m=near.path_height_m,
-        lateral_guidance_m=near.lateral_guidance_m,
-        vertical_guidance_m=near.vertical_guidance_m,
-        lateral_dot_m=near.lateral_dot_m,
-        vertical_dot_m=near.vertical_dot_m,
+        distance_m=relative.distance_m,
+        across_m=relative.across_m,
+        height_m=relative.height_m,
+        path_height_m=relative.glide_path_height_m,
+        lateral_guidance_m=relative.lateral_guidance_m,
+        vertical_guidance_m=relative.vertical_guidance_m,
+        lateral_dot_m=relative.lateral_dot_m,
+        vertical_dot_m=relative.vertical_dot_m,
         lateral_dots=path.lateral_dots[rows],
         vertical_dots=path.vertical_dots[rows],
         latitude_deg=path.latitude_deg[rows],

@@ -22,7 +22,6 @@ HIGHEST_RATE_HZ = 4.0
 LARGEST_GAP_S = 5.0
 SHORTEST_LEAVE_S = 2.5  # what leaves the guidance for less has not left it
 POSITION = ("latitude_deg", "longitude_deg")
-METRES_PER_DEG = 111_195.0  # of latitude, for the size of steps
 SMOOTHED_S = 6.0  # over which speeds and sink rates of stepped signals are taken
 # Height -> whether it counts from the airfield.
 HEIGHTS = (
@@ -36,7 +35,7 @@ HEIGHTS = (
 )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class FlightPath:
     """A flight's motion with what guided it, arrays of shape (n,), NaN where not known.
 
@@ -93,21 +92,21 @@ def path_of(flight: "Flight", settings: LandingSettings) -> FlightPath:
     if not np.isfinite(airspeed_mps).any():
         airspeed_mps = field("air", "true_airspeed_mps")
     return FlightPath(
-        topic,
-        guidance,
-        altitude_source,
-        is_above,
-        time_ns,
-        time_s,
-        table.values("latitude_deg"),
-        table.values("longitude_deg"),
-        altitude_m,
-        _ground_speed(flight, topic, time_ns),
-        -slope(time_s, altitude_m),
-        bank_deg,
-        airspeed_mps,
-        _at(flight, guidance, "lateral_deviation_dots", time_ns),
-        _at(flight, guidance, "vertical_deviation_dots", time_ns),
+        position_topic=topic,
+        guidance_topic=guidance,
+        altitude_source=altitude_source,
+        is_above_airfield=is_above,
+        time_ns=time_ns,
+        time_s=time_s,
+        latitude_deg=table.values("latitude_deg"),
+        longitude_deg=table.values("longitude_deg"),
+        altitude_m=altitude_m,
+        ground_speed_mps=_ground_speed(flight, topic, time_ns),
+        sink_rate_mps=-slope(time_s, altitude_m),
+        bank_deg=bank_deg,
+        airspeed_mps=airspeed_mps,
+        lateral_dots=_at(flight, guidance, "lateral_deviation_dots", time_ns),
+        vertical_dots=_at(flight, guidance, "vertical_deviation_dots", time_ns),
     )
 
 

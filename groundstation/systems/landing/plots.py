@@ -52,7 +52,7 @@ def deviations(results: FlightResults, of: str) -> Plot | None:
         f"Approach {one.number}: deviations",
         "Line: deviation by the guidance, in metres. Dots: the same by recorded positions, and by the recorded height. "
         "Shade: one dot. Broken lines: ± 95 % figures of the categories (horizontal and vertical), CAT II and III ILS "
-        "look-alike. Linear within 20 m, logarithmic beyond.",
+        f"look-alike. Linear within {LINEAR_M:g} m, logarithmic beyond.",
         "Lateral and vertical deviation of the approach against distance to the threshold.",
         (Row((lateral,), 38.0, shares_x=True), Row((vertical,), 38.0)),
         ("landing_path",),
@@ -109,8 +109,9 @@ def final(results: FlightResults, of: str) -> Plot | None:
     return Plot(
         f"landing.final.{of}",
         f"Approach {one.number}: the final",
-        f"Above: positions against the course line and its sector of ± 2 dots, scales differ. Below: height by "
-        f"{one.height_source or 'nothing'} and the path; fine lines are the gate heights. Threshold: {where}.",
+        f"Above: positions against the course line and its sector of ± {DOTS_PER_FULL_SCALE:g} dots, scales differ. "
+        f"Below: height by {one.height_source or 'nothing'} and the path; fine lines are the check heights. "
+        f"Threshold: {where}.",
         "The final from above with the course sector, and from the side with the glide path.",
         (Row((_from_above(one, own),), 28.0, shares_x=True), Row((_from_the_side(one, own),), 33.0)),
         ("landing_path",),
@@ -139,7 +140,7 @@ def _from_above(one: Approach, own: LandingPath) -> Panel:
 def _from_the_side(one: Approach, own: LandingPath) -> Panel:
     distance = own.distance_m / M_PER_KM
     marks: list[AnyMark] = [
-        Limit(value=gate.height_m, role="faint", dash="dotted", emphasis="faint") for gate in one.stabilised
+        Limit(value=check.height_m, role="faint", dash="dotted", emphasis="faint") for check in one.stabilised
     ]
     marks.append(Curve(x=distance, y=own.path_height_m, role="limit", name="path", emphasis="thin"))
     marks.append(Curve(x=distance, y=own.height_m, role="ins", name="flown"))

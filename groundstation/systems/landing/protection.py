@@ -76,7 +76,15 @@ def _told(levels: dict[str, FloatArray], limits: dict[str, FloatArray]) -> Prote
     )
     share = float(within[judged].mean()) if judged.any() else None
     epochs = int(np.isfinite(levels["horizontal"]).sum())
-    return Protection(epochs, horizontal, vertical, least["horizontal"], least["vertical"], share, operations)
+    return Protection(
+        epochs=epochs,
+        horizontal_max_m=horizontal,
+        vertical_max_m=vertical,
+        horizontal_alarm_limit_m=least["horizontal"],
+        vertical_alarm_limit_m=least["vertical"],
+        within_share=share,
+        operations=operations,
+    )
 
 
 def _extreme(values: FloatArray, *, greatest: bool) -> float | None:

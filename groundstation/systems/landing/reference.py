@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray
-from groundstation.base.geodesy import continuous_longitude_deg
+from groundstation.base.geodesy import MEAN_RADIUS_M, continuous_longitude_deg
 from groundstation.base.records import BoolArray
 from groundstation.base.units import M_PER_NAUTICAL_MILE
 from groundstation.results.landing_categories import LINEAR_95
@@ -26,25 +26,34 @@ from groundstation.systems.landing.answer import ErrorPart, PositionError, Runwa
 from groundstation.systems.landing.geometry import along_and_across, metres_per_dot
 from groundstation.systems.landing.settings import LandingSettings
 
+Rows = NDArray[np.intp]
+
+# Samples.
+FEWEST_SAMPLES = 20  # on the localizer, below which nothing is fitted
+MOST_SAMPLES = 400  # of more, every k-th: the covariance has their number squared
+FEWEST_ON_GROUND = 3  # that make a roll-out
+
+# Sensitivity of the localizer.
+FARTHEST_M = 30_000.0  # from the threshold; beyond it deviations do not count
+SATURATED_DOTS = 2.0  # the needle is at its stop
+LEAST_MOVE_M = 100.0  # across the course, below which the ratio shows nothing
+SAMPLES_ALIKE = 5.0  # so many neighbours say what one does
+SURE_SENSITIVITY, SURE_SIGMAS = (0.5, 2.0), 3.0  # a ratio surely outside is of another sense or width
+
+# Parts of the covariance.
 FULL_SCALE_DDM = 0.155  # of a localizer, at the edge of its course sector (ICAO 3.1.3.7)
-MOST_SAMPLES = 400
-FEWEST_ON_GROUND = 3
-UNEVEN_S, FEW_STEPS = 120.0, 4
-SHORTEST_DRIFT_S = 600.0
+UNEVEN_S = 120.0  # a step of a coordinate that takes so long is not crossed evenly at all
+FEW_STEPS = 4  # a coordinate that crosses fewer shows little of its own drift
 BEARING, THRESHOLD, ROUNDING, CURVATURE = (
     *("bearing of the runway", "place of the threshold", "rounding of the positions", "curvature of the error"),
 )
 COMMON = (BEARING, THRESHOLD, ROUNDING, CURVATURE)  # to final and roll-out, or told apart
 LINE, WIDTH = "mean course line", "width of the course"
-SYSTEMATIC = (*COMMON, LINE, WIDTH)
-AT_THRESHOLD, RATE = np.array([1.0, 0.0]), np.array([0.0, 1.0])
-Rows = NDArray[np.intp]
-FEWEST_SAMPLES = 20
-FARTHEST_M = 30_000.0
-SATURATED_DOTS = 2.0
-SURE_SENSITIVITY = (0.5, 2.0)
-SURE_SIGMAS = 3.0
-LEAST_MOVE_M, SAMPLES_ALIKE = 100.0, 5.0
+SYSTEMATIC = (*COMMON, LINE, WIDTH)  # common to all samples: no residual shows them, and none widens them
+
+# Result.
+AT_THRESHOLD, RATE = np.array([1.0, 0.0]), np.array([0.0, 1.0])  # weights of the state: the error there, its growth
+SHORTEST_DRIFT_S = 600.0  # of flight, below which no drift per hour is told
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,8 +244,8 @@ def _parts(
 
 def step_across_m(positions: Positions, runway: RunwayUsed) -> FloatArray:
     """Return the size across the course of a step of latitude and of longitude, metres."""
-    north_m = np.deg2rad(positions.step_deg[0]) * 6_371_000.0
-    east_m = np.deg2rad(positions.step_deg[1]) * 6_371_000.0 * np.cos(np.deg2rad(runway.latitude_deg))
+    north_m = np.deg2rad(positions.step_deg[0]) * MEAN_RADIUS_M
+    east_m = np.deg2rad(positions.step_deg[1]) * MEAN_RADIUS_M * np.cos(np.deg2rad(runway.latitude_deg))
     course_rad = np.deg2rad(runway.true_course_deg)
     return np.asarray(np.abs([north_m * np.sin(course_rad), east_m * np.cos(course_rad)]))
 

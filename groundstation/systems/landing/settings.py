@@ -1,4 +1,4 @@
-"""Settings of the approaches. Every limit of the method stands here, with its source.
+"""Settings of recorded approaches: every limit of the method, with its source.
 
 FSF: Flight Safety Foundation, ALAR Briefing Note 7.1, Stabilized Approach (2000). Airbus: Flight Operations Briefing
 Notes, Flying Stabilized Approaches (2006). ICAO: Annex 10, volume I, 3.1.3 and 3.1.5.
@@ -17,35 +17,31 @@ LIMITS = frozenset({"deviation_max_dots", "sink_rate_max_mps", "bank_max_deg", "
 
 @dataclass(frozen=True)
 class LandingSettings:
-    """Limits of the analysis of recorded approaches.
+    """Limits of the analysis of recorded approaches, each with what it bounds and its source."""
 
-    ``localizer_width_m`` is the full width of the course sector at the threshold, ``localizer_distance_m`` from the
-    threshold to its antenna, ``glide_angle_deg`` and ``threshold_crossing_height_m`` those of the path: each where the
-    site file does not say. ``aiming_point_m`` is how far behind the threshold an aircraft touches down, where the
-    threshold is not known. ``course_line_m`` is the tolerance of the mean course line at the threshold (10.5, 7.5 and
-    3 m for category I, II and III), ``bend_ddm`` the 95 % amplitude of its bends, ``width_share``
-    the tolerance of its sensitivity. ``positions_rounded`` says how the recorder writes
-    positions; unknown widens the interval by what cutting off would shift them.
-    """
-
+    # Established on the guidance: deviations below these for so long.
     established_lateral_dots: float = number(0.5, 0.05, 2.0)
-    established_vertical_dots: float = number(1.0, 0.05, 2.0)
+    established_vertical_dots: float = number(1.0, 0.05, 2.0)  # counts where a glide path is logged
     established_min_s: float = number(20.0, 1.0, 600.0)
+
+    # Finals: what is an approach.
     speed_min_mps: float = number(25.0, 5.0, 200.0)  # an approach, not a taxi
-    final_max_m: float = number(35_000.0, 2_000.0, 100_000.0)
-    final_min_m: float = number(1_000.0, 100.0, 20_000.0)
-    final_height_min_m: float = number(30.0, 1.0, 1_000.0)
-    course_tolerance_deg: float = number(12.0, 1.0, 45.0)
+    final_max_m: float = number(35_000.0, 2_000.0, 100_000.0)  # the search goes so far back from the end
+    final_min_m: float = number(1_000.0, 100.0, 20_000.0)  # straight before the end, at least
+    final_height_min_m: float = number(30.0, 1.0, 1_000.0)  # that a final descends, at least
+    course_tolerance_deg: float = number(12.0, 1.0, 45.0)  # of the track to the course on a straight final
     runway_reach_m: float = number(2_000.0, 50.0, 20_000.0)  # a line that passes farther off is another runway's
-    go_around_height_max_m: float = number(1_000.0 * M_PER_FOOT, 10.0, 1_000.0)
-    go_around_climb_min_m: float = number(100.0, 10.0, 1_000.0)
+    go_around_height_max_m: float = number(1_000.0 * M_PER_FOOT, 10.0, 1_000.0)  # of its lowest point
+    go_around_climb_min_m: float = number(100.0, 10.0, 1_000.0)  # from that point
 
-    localizer_width_m: float = number(700.0 * M_PER_FOOT, 10.0, 1_000.0)  # ICAO 3.1.3.7.1: 210 m at the threshold
-    localizer_distance_m: float = number(3_300.0, 500.0, 10_000.0)
+    # Runway and its aids, where the site file does not say.
+    localizer_width_m: float = number(700.0 * M_PER_FOOT, 10.0, 1_000.0)  # of the full sector there; ICAO 3.1.3.7.1
+    localizer_distance_m: float = number(3_300.0, 500.0, 10_000.0)  # from the threshold to the antenna
     glide_angle_deg: float = number(3.0, 1.0, 10.0)
-    threshold_crossing_height_m: float = number(15.0, 0.0, 50.0)
-    aiming_point_m: float = number(300.0, 0.0, 2_000.0)
+    threshold_crossing_height_m: float = number(15.0, 0.0, 50.0)  # of the glide path
+    aiming_point_m: float = number(300.0, 0.0, 2_000.0)  # of a touchdown behind a threshold that is not known
 
+    # Stabilised: the check heights (a gate in the name is one of them), then the limits of the criteria.
     gate_high_m: float = number(1_000.0 * M_PER_FOOT, 20.0, 2_000.0)  # FSF: in instrument conditions
     gate_low_m: float = number(500.0 * M_PER_FOOT, 20.0, 2_000.0)  # FSF: in visual conditions
     gate_floor_m: float = number(100.0 * M_PER_FOOT, 0.0, 500.0)  # below it the flare begins
@@ -54,19 +50,24 @@ class LandingSettings:
     speed_above_max_mps: float = number(20.0 * MPS_PER_KNOT, 0.5, 100.0)  # FSF: reference + 20 kt
     bank_max_deg: float = number(7.0, 1.0, 60.0)  # Airbus
 
-    course_line_m: float = number(10.5, 0.0, 100.0)  # ICAO 3.1.3.6.1, category I
+    # The localizer as reference: tolerances as 95 %, then sigmas of places and positions.
+    course_line_m: float = number(10.5, 0.0, 100.0)  # at the threshold; ICAO 3.1.3.6.1: 7.5 and 3 m for II and III
     bend_ddm: float = number(0.015, 0.0, 0.1)  # ICAO 3.1.3.4.2, category I near the threshold
     bend_length_m: float = number(1_000.0, 10.0, 10_000.0)  # over which a bend is one
-    width_share: float = number(0.17, 0.0, 1.0)  # ICAO 3.1.3.7.3, category I and II
+    width_share: float = number(0.17, 0.0, 1.0)  # of the width; ICAO 3.1.3.7.3, category I and II
     threshold_sigma_m: float = number(1.0, 0.0, 100.0)  # surveyed coordinates
     centre_line_sigma_m: float = number(3.0, 0.1, 50.0)  # a roll-out beside the centre line
     position_curvature_mps2: float = number(1e-3, 0.0, 0.1)  # of an INS error over some minutes
     position_noise_m: float = number(3.0, 0.01, 100.0)  # beyond the steps it is written in
-    positions_rounded: Rounding = "unknown"
+    positions_rounded: Rounding = (
+        "unknown"  # how the recorder writes them; unknown: cut off or not, both are allowed for
+    )
+
+    # The runway as reference of altitudes.
     reference_height_m: float = number(3.0, 0.0, 20.0)  # of the altitude's reference above the ground, on the wheels
     reference_height_sigma_m: float = number(2.0, 0.0, 20.0)
     runway_slope: float = number(0.01, 0.0, 0.1)  # ICAO Annex 14, volume I, 3.1.13: 1 % of the length, as 95 %
-    elevation_sigma_m: float = number(0.3, 0.0, 20.0)
+    elevation_sigma_m: float = number(0.3, 0.0, 20.0)  # of the threshold in the site file
 
     def __post_init__(self) -> None:
         check_ranges(self)

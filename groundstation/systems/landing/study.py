@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.errors import NotAssessableError
+from groundstation.base.geodesy import METRES_PER_DEG
 from groundstation.chapters.parts import Section
 from groundstation.results.figures import FigureData
 from groundstation.results.landing_categories import LINEAR_95
@@ -30,7 +31,6 @@ from groundstation.systems.study import StudyResult, section, table
 from groundstation.tables.phases import flight_phases
 
 Progress = Callable[[str], None]
-M_PER_DEG = 111_195.0
 ASSUMED = LandingSettings()
 
 
@@ -164,8 +164,8 @@ def site_of(scenario: ApproachScenario, rng: np.random.Generator) -> SiteData:
         "X",
         float((runway.true_course_deg + rng.normal(0.0, 0.05)) % 360.0),
         0.05,
-        runway.latitude_deg + north_m / M_PER_DEG,
-        runway.longitude_deg + east_m / (M_PER_DEG * np.cos(np.deg2rad(runway.latitude_deg))),
+        runway.latitude_deg + north_m / METRES_PER_DEG,
+        runway.longitude_deg + east_m / (METRES_PER_DEG * np.cos(np.deg2rad(runway.latitude_deg))),
         length_m=runway.length_m,
         localizer_width_m=runway.localizer_width_m,
     )

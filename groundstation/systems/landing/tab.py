@@ -22,7 +22,7 @@ from groundstation.viewer.views import document
 SEEN_M = 6_000.0  # of the final, before the threshold
 ENLARGED = 10.0  # across and up against along: corridors of metres along kilometres
 MARK, TRAIL, EDGE = 6.0, 2.0, 0.8  # radii in points of the screen
-MOST_APPROACHES = 6
+MOST_TABS = 6
 SHADES = dict(zip((one.name for one in CATEGORIES), (colours.ORANGE, colours.PINK, colours.YELLOW_GREEN), strict=True))
 SPACE_NAME = (
     f"Last {SEEN_M / 1000:g} km; across and up drawn {ENLARGED:g} times; frames: 95 % of CAT I, II and IIIA, IIIB"
@@ -36,7 +36,7 @@ def landing(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     if answer is None or section is None or data is None:
         return None
     recorder.document("landing/answer", markdown(section))
-    tabs = [_approach(recorder, results, one, data) for one in answer.approaches[:MOST_APPROACHES]]
+    tabs = [_approach(recorder, results, one, data) for one in answer.approaches[:MOST_TABS]]
     approaches = tabs[0] if len(tabs) == 1 else rrb.Tabs(contents=tabs, active_tab=0)
     text = document("Approaches", "landing/answer")
     return rrb.Horizontal(contents=[approaches, text], column_shares=[3.0, 1.5], name="Landing")

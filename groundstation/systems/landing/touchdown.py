@@ -8,43 +8,43 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.geodesy import continuous_longitude_deg
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import MPS2_PER_G
-from groundstation.systems.landing.answer import RunwayUsed, Touchdown
+from groundstation.systems.landing.answer import PEAK_S, SINK_S, RunwayUsed, Touchdown
 from groundstation.systems.landing.finals import Final
-from groundstation.systems.landing.geometry import Against, along_and_across, line_through
+from groundstation.systems.landing.geometry import RelativeToRunway, along_and_across, line_through
 from groundstation.systems.landing.path import FlightPath, slope
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight
 
-SINK_S = 3.0  # before the touchdown, over which the sink rate is taken
-PEAK_S = 2.0
 LOAD_RANGE_G = (-1.0, 4.0)  # beyond it a sample is a fault of the recorder
 SPIKE_G = 1.5  # of one sample against both its neighbours
 
 
-def touchdown_of(flight: "Flight", path: FlightPath, final: Final, runway: RunwayUsed, near: Against) -> Touchdown:
+def touchdown_of(
+    flight: "Flight", path: FlightPath, final: Final, runway: RunwayUsed, relative: RelativeToRunway
+) -> Touchdown:
     """Measure the touchdown that a final ends in."""
     at_s = final.end.time_s
     places = path.latitude_deg, continuous_longitude_deg(path.longitude_deg)
     latitude, longitude = (float(np.interp(at_s, path.time_s, one)) for one in places)
     longitude = longitude if abs(longitude) <= 180.0 else float(wrap_180(longitude))
     distance_m, _across = along_and_across(np.array([latitude]), np.array([longitude]), runway)
-    on_ground = np.arange(near.rows.start, near.rows.stop)[~near.is_final]
+    on_ground = np.arange(relative.rows.start, relative.rows.stop)[~relative.is_final]
     course = None
     if len(on_ground) >= 3 and np.isfinite(path.ground_speed_mps[on_ground]).any():
         course = line_through(path, slice(int(on_ground[0]), int(on_ground[-1]) + 1)).course_deg
     speed_mps = float(np.interp(at_s, path.time_s, path.ground_speed_mps))
     return Touchdown(
-        at_s,
-        final.end.sigma_s,
-        final.end.found_by,
-        latitude,
-        longitude,
-        -float(distance_m[0]) if runway.placed_by == "site file" else None,
-        speed_mps if np.isfinite(speed_mps) else None,
-        _sink_rate(flight, path, at_s),
-        _peak_load(flight, at_s),
-        course,
+        time_s=at_s,
+        time_sigma_s=final.end.sigma_s,
+        found_by=final.end.found_by,
+        latitude_deg=latitude,
+        longitude_deg=longitude,
+        past_threshold_m=-float(distance_m[0]) if runway.placed_by == "site file" else None,
+        ground_speed_mps=speed_mps if np.isfinite(speed_mps) else None,
+        sink_rate_mps=_sink_rate(flight, path, at_s),
+        peak_load_g=_peak_load(flight, at_s),
+        rollout_course_deg=course,
     )
 
 

@@ -1,5 +1,6 @@
 """The chapter, the figures and the tab of the approaches: what they show is what the answer holds."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +10,11 @@ from groundstation.chapters.markdown import markdown
 from groundstation.reports.drawing import Drawing, drawn_by
 from groundstation.results.answer import by_analysis
 from groundstation.results.flight import FlightResults, Source
+from groundstation.results.gates import GateState
 from groundstation.simulation.approach import load_approach, simulate_approach
-from groundstation.systems.landing.answer import LandingResult
+from groundstation.systems.landing.answer import LandingResult, StabilisedAt
 from groundstation.systems.landing.chapter import landing
+from groundstation.systems.landing.stabilised import decide
 from tests.recording_contents import Contents
 from tests.systems.landing.test_approaches import found, site
 from tests.told import PLOTS, write_recording
@@ -44,6 +47,48 @@ def test_the_chapter_says_what_was_measured_and_what_was_not(with_site: FlightRe
     assert "Accuracy only" in text
     without = landing(results(False))
     assert without is not None and "not measured" in markdown(without)
+
+
+def claimed(told: FlightResults, **changed: StabilisedAt) -> str:
+    """The sentence under the claim, after changes of the last approach by check height: high or low."""
+    answer = told.answer(LandingResult)
+    assert answer is not None
+    one = replace(answer.approaches[-1], stabilised=tuple(changed.values()))
+    section = landing(replace(told, answers=by_analysis(replace(answer, approaches=(one,)))))
+    assert section is not None and section.claim is not None
+    return section.claim.sentences[0].replace("\u202f", " ")
+
+
+def test_a_verdict_says_what_it_rests_on(with_site: FlightResults) -> None:
+    answer = with_site.answer(LandingResult)
+    assert answer is not None
+    high, low = answer.approaches[-1].stabilised
+    states: tuple[GateState, ...] = ("passed", "not_measured", "passed", "not_measured", "not_measured")
+    gates = tuple(replace(one, state=state) for one, state in zip(low.gates, states, strict=True))
+    partly = replace(low, gates=gates, verdict=decide(gates))
+    empty = tuple(replace(one, state="not_measured") for one in high.gates)
+    said = claimed(with_site, high=replace(high, gates=empty, verdict=decide(empty)), low=partly)
+    assert said == (
+        "From 305 m: not measured (no criterion is in the log). From 152 m: stabilised (2 of 5 criteria judged)."
+    )
+    reason = "the straight final begins at 200 m"
+    failed = tuple(replace(one, state="failed" if one.name == "bank" else one.state) for one in gates)
+    said = claimed(
+        with_site,
+        high=StabilisedAt(high.height_m, "not measured", None, (), reason),
+        low=replace(low, gates=failed, verdict=decide(failed)),
+    )
+    assert said == f"From 305 m: not measured ({reason}). From 152 m: not stabilised (bank)."
+
+
+def test_limits_on_the_page_are_those_of_the_settings(with_site: FlightResults) -> None:
+    answer = with_site.answer(LandingResult)
+    assert answer is not None
+    other = {**answer.settings, "gate_floor_m": 45.0, "established_lateral_dots": 0.75}
+    section = landing(replace(with_site, answers=by_analysis(replace(answer, settings=other))))
+    assert section is not None
+    text = markdown(section).replace("\u202f", " ")
+    assert "down to 45 m" in text and "within 0.75 dot of the course and 1 dot of the path" in text
 
 
 def test_every_figure_is_drawn(with_site: FlightResults) -> None:

@@ -14,7 +14,7 @@ from groundstation.systems.landing.beacons.answer import BeaconLanding
 
 FARTHEST_M, NEAREST_M, LATERAL_M, VERTICAL_M = 5000.0, -500.0, 150.0, 40.0
 MEDIAN_OF = 15  # places: the band of one place jumps with it
-MOST_APPROACHES = 7
+MOST_DRAWN = 7  # as many as series have colours
 
 
 def deviations(results: FlightResults) -> Plot | None:
@@ -46,7 +46,7 @@ def _marks(
     before = data.straight_before_threshold_m
     marks: list[AnyMark] = []
     dots: list[AnyMark] = []
-    for place, one in enumerate(answer.approaches[:MOST_APPROACHES]):
+    for place, one in enumerate(answer.approaches[:MOST_DRAWN]):
         rows = np.flatnonzero((data.approach == one.approach) & (before < FARTHEST_M) & (before > NEAREST_M))
         x, half = before[rows] / M_PER_KM, _running_median(LINEAR_95 * sigma[rows])
         name = "95 % of one position" if one.approach == 1 else ""
