@@ -126,13 +126,31 @@ def north_east_m(
     return north, east
 
 
+def is_near_pole(latitude_deg: ArrayLike) -> bool:
+    """Tell whether one of some places lies so near a pole that a plan is drawn from above.
+
+    Examples
+    --------
+    >>> is_near_pole([56.0, np.nan, -89.0]), is_near_pole(56.0)
+    (True, False)
+    """
+    with np.errstate(invalid="ignore"):
+        return bool((np.abs(np.asarray(latitude_deg, dtype=np.float64)) > POLAR_LATITUDE_DEG).any())
+
+
 def plan_north_east_m(
-    latitude_deg: ArrayLike, longitude_deg: ArrayLike, origin_latitude_deg: float, origin_longitude_deg: float
+    latitude_deg: ArrayLike,
+    longitude_deg: ArrayLike,
+    origin_latitude_deg: float,
+    origin_longitude_deg: float,
+    *,
+    is_polar: bool | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Places on a plan, metres north and east of an origin; true in shape near a pole too.
 
     Where one place lies beyond 85 deg of latitude, all are drawn at their distance and direction from the origin
-    (azimuthal equidistant), so that a straight flight over a pole is a straight line.
+    (azimuthal equidistant), so that a straight flight over a pole is a straight line. ``is_polar`` says so for places
+    that are drawn on the plan of others.
 
     Examples
     --------
@@ -141,7 +159,9 @@ def plan_north_east_m(
     ([0.0, 111.7, 223.4], [True, True, True])
     """
     latitude, longitude = on_earth(latitude_deg, longitude_deg)
-    if not (np.abs(np.append(latitude, origin_latitude_deg)) > POLAR_LATITUDE_DEG).any():
+    if is_polar is None:
+        is_polar = is_near_pole(np.append(latitude, origin_latitude_deg))
+    if not is_polar:
         return north_east_m(latitude, longitude, origin_latitude_deg, origin_longitude_deg)
     latitude_rad, difference_rad = np.deg2rad(latitude), np.deg2rad(longitude - origin_longitude_deg)
     origin_rad = np.deg2rad(origin_latitude_deg)

@@ -60,6 +60,8 @@ class Panel:
     legend : {'above', 'beside', ''}
     is_map : bool
         One metre is as long upright as it is across; the range of one axis grows to fit.
+    unit_m : float
+        Of a map whose axes are north and east, metres of a unit: it has a scale bar and an arrow to the north. 0: none.
     nothing : str
         Why the panel is empty, where it is: written in its middle.
     share : float
@@ -72,6 +74,7 @@ class Panel:
     title: str = ""
     legend: Literal["above", "beside", ""] = "above"
     is_map: bool = False
+    unit_m: float = 0.0
     nothing: str = ""
     share: float = 1.0
 

@@ -1,17 +1,21 @@
 """Plots of the flight at a glance: track map, altitude, speed, phases and state of GNSS."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.ellipse import ELLIPSE_95, outlines
-from groundstation.base.geodesy import on_earth, plan_north_east_m
+from groundstation.base.geodesy import is_near_pole, on_earth, plan_north_east_m
+from groundstation.chapters.plots import coast
 from groundstation.chapters.plots.common import lane_roles, span
 from groundstation.chapters.wording import number
 from groundstation.plots.axes import time_axis
+from groundstation.plots.extents import x_extent, y_extent
 from groundstation.plots.marks import AnyMark, Curve, Floats, Lanes, Outlines, Points, Role, Spans, Told
 from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
-from groundstation.plots.ranges import broken_at_wrap, finite
+from groundstation.plots.ranges import broken_at_wrap, finite, padded
+from groundstation.plots.scales import MARGIN
 from groundstation.results.arrays.flight import GnssLanes, Overview, PhaseSpans, StateLanes
 from groundstation.results.arrays.typed import Flags
 from groundstation.results.corrected_position import CorrectedPosition, corrected_position
@@ -21,6 +25,8 @@ from groundstation.results.roles import OnTaxi
 SMALLEST_TAXI_M = 10.0  # less is no taxi worth enlarging: a receiver at rest, or a start by hand
 SMALLEST_MAP_M = 2.0  # side of the map of an aircraft that did not move
 LARGEST_IN_METRES = 3000.0
+LARGEST_OF_ONE_SCALE_M = 200_000.0  # beyond it the scale 60 deg north is 3 % off at the other end
+ASPECTS, HALF_ASPECTS = (1.95, 2.15), (0.88, 1.05)  # of the frame of a map alone, of one of two: least and greatest
 MOST_MODES, MOST_GNSS_STATES = 12, 8
 LANE_MM = 4.6
 STATE_ROLES: dict[str, Role] = {"armed": "bad", "on the ground": "series 6"}
@@ -49,7 +55,10 @@ def track_map(results: FlightResults) -> Plot | None:
     larger = 1 if corrected is None else corrected.larger(_extent(north, east))
     scale = _scale(north, east)[0]
     behind = () if corrected is None else (_ellipses(corrected, origin, larger, scale),)
-    panels = [_map(time, north, east, used, "Whole flight" if zoom else "", behind)]
+    whole = _map(time, north, east, used, "Whole flight" if zoom else "", behind)
+    is_polar = is_near_pole(latitude)
+    shore = _shore(whole, HALF_ASPECTS if zoom else ASPECTS, origin, is_polar=is_polar)
+    panels = [whole if shore is None else shore]
     if zoom:
         panels.append(_map(time[taxi], north[taxi], east[taxi], used[taxi], "Taxi"))
     caption = f"Ring: start ({number(origin[0], 5, '°')}, {number(origin[1], 5, '°')})."
@@ -58,6 +67,10 @@ def track_map(results: FlightResults) -> Plot | None:
     if corrected is not None:
         size = f", drawn {number(larger, 0)} times their size" if larger > 1 else ""
         caption += f" Ellipses: 95 % of the corrected position{size}."
+    if shore is not None:
+        caption += coast.CAPTION
+    if is_polar or _extent(north, east) > LARGEST_OF_ONE_SCALE_M:
+        caption += " Scale and north are those at the start."
     alt = "Map of the track in metres north and east of the start."
     rows = (Row(tuple(panels), 72.0 if zoom else 78.0),)
     return Plot("overview.track", "Track", caption, alt, rows, ("overview",))
@@ -116,7 +129,24 @@ def _map(time: Floats, north: Floats, east: Floats, used: Flags, title: str, beh
             Axis(axis.title, low=low, high=high)
             for axis, (low, high) in ((x, _at_least(east, first)), (y, _at_least(north, first)))
         )
-    return Panel(marks, x, y, title=title, legend="", is_map=True)
+    return Panel(marks, x, y, title=title, legend="", is_map=True, unit_m=1.0 / scale)
+
+
+def _shore(
+    panel: Panel, aspects: tuple[float, float], origin_deg: tuple[float, float], *, is_polar: bool
+) -> Panel | None:
+    """Return a map with the coast beneath it, its axes as they were; None without a coast in its frame."""
+    found = [extent(panel.marks).tolist() for extent in (x_extent, y_extent)]
+    ends = [padded(low, high, MARGIN) for low, high in found]
+    across, up = (0.5 * panel.unit_m * (high - low) for low, high in ends)
+    middle = tuple(0.5 * panel.unit_m * (low + high) for low, high in ends)
+    half = max(across, aspects[0] * up), max(up, across / aspects[1])
+    rings = coast.coast((middle[0], middle[1]), half, origin_deg, is_polar=is_polar)
+    if not rings:
+        return None
+    x, y = (replace(axis, low=low, high=high) for axis, (low, high) in zip((panel.x, panel.y), ends, strict=True))
+    marks = (coast.outlines(rings, 1.0 / panel.unit_m), *panel.marks)
+    return replace(panel, marks=marks, x=x, y=y)
 
 
 def _at_least(values: Floats, first: int) -> tuple[float, float]:

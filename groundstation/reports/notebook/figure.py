@@ -15,6 +15,7 @@ from matplotlib.axis import Axis
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
+from matplotlib.patches import Polygon
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedFormatter, FixedLocator, Formatter, Locator, NullLocator
 from matplotlib.transforms import ScaledTranslation
@@ -23,7 +24,7 @@ from groundstation.plots.extents import has_rows, names_of
 from groundstation.plots.marks import Cells
 from groundstation.plots.plot import Plot
 from groundstation.plots.scales import ScaleSpan
-from groundstation.reports.notebook.shapes import draw, handle_of
+from groundstation.reports.notebook.shapes import ABOVE_ALL, draw, handle_of
 from groundstation.reports.svg import boxes as b
 from groundstation.reports.svg.boxes import Box, PlacedPanel
 from groundstation.reports.svg.cells import span_of_colours
@@ -31,6 +32,7 @@ from groundstation.reports.svg.colours import EDGE, FAINT, GRID, INK, PAPER
 from groundstation.reports.svg.font import SIZE_PT, TITLE_PT, label, lines_of, middle
 from groundstation.reports.svg.labels import HALO_PT, labels_of
 from groundstation.reports.svg.legend import BETWEEN_PT, GAP_PT, LINE_PT, SIGN_PT, Entry
+from groundstation.reports.svg.map_scale import BAR_PT, END_PT, NORTH, map_scale_of
 from groundstation.reports.svg.ticks import ticks_of
 
 SHOWN_DPI = 144  # sharp on screens of two pixels a point
@@ -187,6 +189,7 @@ def _frame(figure: Figure, box: Box, height: float) -> Axes:
         draw(mark, axes, box, place)
     axes.set(xlim=(box.x.low, box.x.high), ylim=(box.y.low, box.y.high))
     _labels(axes, box, height)
+    _map_scale(axes, box)
     if panel.nothing:
         told_lines = "\n".join(lines_of(label(panel.nothing, 200), box.width - SIZE_PT, 4))
         axes.text(0.5, 0.5, told_lines, transform=axes.transAxes, ha="center", va="center", color=FAINT)
@@ -241,6 +244,30 @@ def _labels(axes: Axes, box: Box, height: float) -> None:
             color=one.colour,
             path_effects=[withStroke(linewidth=HALO_PT, foreground=PAPER)],
         )
+
+
+def _map_scale(axes: Axes, box: Box) -> None:
+    """Draw scale bar and arrow of a map; the bar is as long as it says when the axes are moved."""
+    scale = map_scale_of(box)
+    if scale is None:
+        return
+    halo = [withStroke(linewidth=BAR_PT + HALO_PT, foreground=PAPER)]
+    left, bottom = _value(box, scale.left, scale.bottom)
+    right, upper = _value(box, scale.right, scale.bottom - END_PT)
+    look: dict[str, Any] = {"color": INK, "path_effects": halo, "zorder": ABOVE_ALL + 1.0}
+    axes.plot([left, left, right, right], [upper, bottom, bottom, upper], linewidth=BAR_PT, **look)
+    arrow = [_value(box, *corner) for corner in scale.corners]
+    axes.add_patch(Polygon(arrow, closed=True, linewidth=0.0, **look))
+    for text, x, base in ((scale.text, scale.middle, scale.number_base), (NORTH, scale.arrow, scale.letter_base)):
+        place = _value(box, x, scale.bottom)
+        beside = (0.0, scale.bottom - base)
+        axes.annotate(text, place, beside, textcoords="offset points", ha="center", va="baseline", **look)
+
+
+def _value(box: Box, x: float, y: float) -> tuple[float, float]:
+    """Return the values of both axes at a place in points."""
+    across, up = (x - box.left) / box.width, (box.bottom - y) / box.height
+    return box.x.low + across * (box.x.high - box.x.low), box.y.low + up * (box.y.high - box.y.low)
 
 
 def _scale_beside(figure: Figure, cells: Cells, axes: Axes, box: Box, height: float) -> None:

@@ -22,6 +22,7 @@ from groundstation.reports.svg.cells import scale_beside
 from groundstation.reports.svg.colours import EDGE, FAINT, GRID, INK, PAPER
 from groundstation.reports.svg.font import LINE_SHARE, SIZE_PT, TITLE_PT, label, lines_of, middle, written
 from groundstation.reports.svg.labels import HALO_PT, labels_of
+from groundstation.reports.svg.map_scale import map_scale
 from groundstation.reports.svg.shapes import is_within, shape
 from groundstation.reports.svg.ticks import Tick
 
@@ -73,7 +74,7 @@ def _frame(box: Box, clip: str) -> str:
     grounds = "".join(told for mark, told in under if isinstance(mark, Spans | Cells))
     rest = "".join(told for mark, told in under if not isinstance(mark, Spans | Cells))
     within = f'<g clip-path="url(#{clip})">{grounds}{_grid(box) if has_grid else ""}{rest}</g>'
-    return within + _axes(box) + "".join(told for _, told in over) + _labels(box) + _nothing(box)
+    return within + _axes(box) + "".join(told for _, told in over) + map_scale(box) + _labels(box) + _nothing(box)
 
 
 def _x_places(box: Box) -> list[tuple[float, str]]:
