@@ -86,20 +86,20 @@ def motion_of(flight: Flight) -> Motion:
     size = grid_size(flight)
     ins, gnss = first_of_kind(flight, "ins"), first_of_kind(flight, "gnss")
     usable = _usable_fixes(gnss)
-    speed = _on_grid(flight, gnss, np.where(usable, horizontal_speed_mps(gnss), np.nan), size)
-    speed = np.where(np.isfinite(speed), speed, _on_grid(flight, ins, horizontal_speed_mps(ins), size))
+    speed = on_grid(flight, gnss, np.where(usable, horizontal_speed_mps(gnss), np.nan), size)
+    speed = np.where(np.isfinite(speed), speed, on_grid(flight, ins, horizontal_speed_mps(ins), size))
     true_heading, magnetic = ins.values("true_heading_deg"), ins.values("magnetic_heading_deg")
     heading = true_heading if np.isfinite(true_heading).any() else magnetic
     north, east = _positions(flight, gnss, ins, size)
     moving = np.nan_to_num(speed, nan=0.0)
     return Motion(
         speed,
-        _on_grid(flight, ins, unwrap(ins.values("roll_deg")), size),
-        _on_grid(flight, ins, ins.values("pitch_deg"), size),
-        _on_grid(flight, ins, unwrap(heading), size),
+        on_grid(flight, ins, unwrap(ins.values("roll_deg")), size),
+        on_grid(flight, ins, ins.values("pitch_deg"), size),
+        on_grid(flight, ins, unwrap(heading), size),
         np.array([_altitude(flight, table, speed) for table in (ins, gnss)]),
         _altitude(flight, first_of_kind(flight, "baro"), speed),
-        np.array([_on_grid(flight, table, -table.values("velocity_down_mps"), size) for table in (ins, gnss)]).reshape(
+        np.array([on_grid(flight, table, -table.values("velocity_down_mps"), size) for table in (ins, gnss)]).reshape(
             2, size
         ),
         north,
@@ -190,7 +190,7 @@ def _positions(flight: Flight, gnss: Table, ins: Table, size: int) -> tuple[Floa
             latitude, longitude = table.values("latitude_deg"), table.values("longitude_deg")
             first = int(np.argmax(known))
             north, east = north_east_m(latitude, longitude, float(latitude[first]), float(longitude[first]))
-            return _on_grid(flight, table, north, size), _on_grid(flight, table, east, size)
+            return on_grid(flight, table, north, size), on_grid(flight, table, east, size)
     unknown = np.full(size, np.nan)
     return unknown, unknown
 
@@ -199,8 +199,8 @@ def _altitude(flight: Flight, table: Table, speed_mps: FloatArray) -> FloatArray
     for name in ("altitude_msl_m", "altitude_ellipsoid_m", "pressure_altitude_m"):
         values = table.values(name)
         if np.isfinite(values).any():
-            on_grid = _on_grid(flight, table, values, len(speed_mps))
-            return np.where(_is_frozen(on_grid, speed_mps), np.nan, on_grid)
+            altitude_m = on_grid(flight, table, values, len(speed_mps))
+            return np.where(_is_frozen(altitude_m, speed_mps), np.nan, altitude_m)
     return np.full(len(speed_mps), np.nan)
 
 
@@ -216,7 +216,7 @@ def _is_frozen(altitude_m: FloatArray, speed_mps: FloatArray) -> BoolArray:
     return frozen
 
 
-def _on_grid(flight: Flight, table: Table, values: FloatArray, size: int) -> FloatArray:
+def on_grid(flight: Flight, table: Table, values: FloatArray, size: int) -> FloatArray:
     """Average the samples nearest to each grid time.
 
     Gaps of at most LARGEST_GAP_S are filled by straight lines.

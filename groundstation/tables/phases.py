@@ -15,6 +15,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.base.units import NS_PER_S
 from groundstation.tables.detector import Detection, GroundSettings, detect_ground, lasting
+from groundstation.tables.likely import likely_of
 from groundstation.tables.motion import (
     RATE_HZ,
     Motion,
@@ -26,11 +27,27 @@ from groundstation.tables.motion import (
     runs,
 )
 from groundstation.tables.table import Flight
+from groundstation.tables.travel import travel_of
+from groundstation.tables.vehicle import Vehicle, VehicleKind, is_stated_to_roll, vehicle_of
 from groundstation.tables.wheels import LONGEST_HOLD_S, contact_of, disbelief, held
 
-Phase = Literal["unknown", "standstill", "taxi", "take-off run", "airborne", "landing roll"]
+Phase = Literal[
+    "unknown",
+    "standstill",
+    "taxi",
+    "take-off run",
+    "airborne",
+    "landing roll",
+    "driving",
+    "walking",
+    "under way",
+    "on the ground",
+    "moving",
+]
 PHASES: tuple[Phase, ...] = get_args(Phase)
-UNKNOWN, STANDSTILL, TAXI, TAKE_OFF_RUN, AIRBORNE, LANDING_ROLL = range(len(PHASES))
+UNKNOWN, STANDSTILL, TAXI, TAKE_OFF_RUN, AIRBORNE, LANDING_ROLL = range(6)
+DRIVING, WALKING, UNDER_WAY, SOMEWHERE_ON_GROUND, MOVING = range(6, len(PHASES))
+ON_GROUND: dict[VehicleKind | None, int] = {"rolls": DRIVING, "walks": WALKING, "floats": UNDER_WAY}  # else taxi
 
 STEP_NS = round(NS_PER_S / RATE_HZ)
 LEAST_COVERAGE = 0.5  # share of the flight for which a flag must speak
@@ -39,8 +56,9 @@ SLOWEST_RUN_MPS = 3.0  # an aircraft that lifts off slower made no run
 LIFTED_M = 1.5  # height at which a lift-off is seen, in smoothed altitudes
 CARRIED_M, CARRIED_S = 5.0, 5.0  # up to that height what is too slow to fly for so long is carried
 SHORTEST_STANDSTILL_S = 3.0
-ALWAYS_ON_GROUND = "always_on_ground"  # metadata of a car's log, from a profile, the log or the aircraft file
-YES = ("true", "yes", "1")
+
+
+NO_VEHICLE = Vehicle(None, "nothing says it")
 
 
 @dataclass(frozen=True)
@@ -64,11 +82,15 @@ class GroundProof:
 
 @dataclass(frozen=True)
 class PhaseInterval:
-    """One phase from ``start_s`` to ``end_s``, flight seconds."""
+    """One phase from ``start_s`` to ``end_s``, flight seconds.
+
+    ``is_proven`` is False where speed and height make it likely and nothing proves it.
+    """
 
     start_s: float
     end_s: float
     phase: Phase
+    is_proven: bool = True
 
 
 @dataclass(frozen=True)
@@ -76,10 +98,22 @@ class Phases:
     """Phases of a flight, and the method that found them.
 
     The intervals do not overlap and reach from its first to its last sample.
+
+    Parameters
+    ----------
+    intervals : tuple of PhaseInterval
+        What is proven, and ``unknown`` elsewhere: all that a method may rest on.
+    method : str
+    likely : tuple of PhaseInterval
+        The same with what is likely in place of ``unknown``: for people.
+    vehicle : Vehicle
+        Kind of vehicle, which names the phases on the ground: taxi, driving, walking or under way.
     """
 
     intervals: tuple[PhaseInterval, ...]
     method: str
+    likely: tuple[PhaseInterval, ...] = ()
+    vehicle: Vehicle = NO_VEHICLE
 
     @property
     def start_s(self) -> FloatArray:
@@ -112,9 +146,9 @@ class Phases:
 def ground_mask(flight: Flight, time_ns: Int64Array, *, settings: GroundSettings | None = None) -> GroundProof:
     """Prove ground contact at given times.
 
-    A log whose metadata say ``always_on_ground`` (a car's) is on the ground throughout. Weight on wheels (or an
-    autopilot's landed flag) decides where it is logged often enough and is plausible: a flag that stays on the wheels
-    high above the ground at speed is not believed. Else the motion has to prove it, see
+    A log whose metadata say ``vehicle`` rolls (or ``always_on_ground``) is on the ground throughout. Weight on wheels
+    (or an autopilot's landed flag) decides where it is logged often enough and is plausible: a flag that stays on the
+    wheels high above the ground at speed is not believed. Else the motion has to prove it, see
     :func:`groundstation.tables.detector.detect_ground`.
 
     Parameters
@@ -135,22 +169,47 @@ def ground_mask(flight: Flight, time_ns: Int64Array, *, settings: GroundSettings
 def flight_phases(flight: Flight, *, settings: GroundSettings | None = None) -> Phases:
     """Divide a flight into standstill, taxi, take-off run, airborne, landing roll and unknown.
 
-    Standstill and taxi are proven ground (:func:`ground_mask`). Airborne is weight off wheels, or, by the detector,
-    everything between lift-off and touch-down around sure flight, both read off the altitude. A take-off run is the
-    stretch before lift-off that is faster than a quarter of the speed there, a landing roll the like after touch-down:
-    these two may hold samples that are not proven ground. All else is unknown.
+    What rolls, walks or floats drives, walks or is under way in place of taxi. Standstill and taxi are proven ground
+    (:func:`ground_mask`). Airborne is weight off wheels, or, by the detector, everything between lift-off and
+    touch-down around sure flight, both read off the altitude. A take-off run is the stretch before lift-off that is
+    faster than a quarter of the speed there, a landing roll the like after touch-down: these two may hold samples that
+    are not proven ground. All else is unknown in ``intervals``, and in ``likely`` what
+    :func:`groundstation.tables.likely.likely_of` makes of it.
     """
     with _evidence_of(flight, settings) as evidence:
         size = grid_size(flight)
         if size <= 1:
             return Phases((), evidence.method)
-        label = _labels(evidence)
-        edges = np.flatnonzero(np.diff(label)) + 1
-        bounds = [0.0, *(float(edge) / RATE_HZ for edge in edges), flight.duration_s]
-        return Phases(
-            tuple(PhaseInterval(start, end, PHASES[label[round(start * RATE_HZ)]]) for start, end in pairwise(bounds)),
-            evidence.method,
+        travel = travel_of(flight, evidence.motion)
+        contact = None if evidence.against_flag else evidence.contact
+        vehicle = vehicle_of(flight, travel, contact, evidence.detection)
+        rolling = ON_GROUND.get(vehicle.kind, TAXI)
+        proven = _labels(evidence, evidence.ground, evidence.airborne, evidence.motion.speed_mps, rolling)
+        found = likely_of(
+            travel, evidence.motion, vehicle.kind, (evidence.ground, evidence.airborne), evidence.detection
         )
+        label = _labels(evidence, found.ground, found.airborne, travel.speed_mps, rolling)
+        label[found.moving & (label == UNKNOWN)] = MOVING
+        is_proven = proven != UNKNOWN
+        label[is_proven] = proven[is_proven]
+        label[(label == rolling) & ~np.isfinite(travel.speed_mps)] = SOMEWHERE_ON_GROUND
+        return Phases(
+            _intervals(flight, proven, np.ones(size, dtype=bool)),
+            evidence.method,
+            _intervals(flight, label, is_proven),
+            vehicle,
+        )
+
+
+def _intervals(flight: Flight, label: NDArray[np.int64], is_proven: BoolArray) -> tuple[PhaseInterval, ...]:
+    """Intervals of one label and one kind of proof, from the start of the flight to its end."""
+    edges = np.flatnonzero((np.diff(label) != 0) | (np.diff(is_proven.astype(np.int8)) != 0)) + 1
+    bounds = [0.0, *(float(edge) / RATE_HZ for edge in edges), flight.duration_s]
+    rows = [0, *edges.tolist()]
+    return tuple(
+        PhaseInterval(start, end, PHASES[label[row]], bool(is_proven[row]))
+        for row, (start, end) in zip(rows, pairwise(bounds), strict=True)
+    )
 
 
 @contextmanager
@@ -179,7 +238,7 @@ class _Evidence:
     def __init__(self, flight: Flight, settings: GroundSettings) -> None:
         self._flight, self.settings = weakref.ref(flight), settings
         self.contact = contact_of(flight)
-        self.is_always_on_ground = flight.metadata.get(ALWAYS_ON_GROUND, "").strip().lower() in YES
+        self.is_always_on_ground = is_stated_to_roll(flight.metadata)
 
     @property
     def flight(self) -> Flight:
@@ -262,15 +321,19 @@ class _Evidence:
 _KEPT: dict[tuple[int, GroundSettings], _Evidence] = {}  # by the identity of a flight that is there
 
 
-def _labels(evidence: _Evidence) -> NDArray[np.int64]:
-    """Phase of every grid time, as its place in PHASES."""
-    ground, speed = evidence.ground, evidence.motion.speed_mps
-    label = np.where(ground, TAXI, UNKNOWN)
+def _labels(
+    evidence: _Evidence, ground: BoolArray, airborne: BoolArray, speed: FloatArray, rolling: int
+) -> NDArray[np.int64]:
+    """Phase of every grid time, as its place in PHASES.
+
+    ``rolling`` is that of moving on the ground.
+    """
+    label = np.where(ground, rolling, UNKNOWN)
     is_slow = ground & (running_mean(speed, 0.5) <= evidence.settings.standstill_speed_mps)
     for start, end in runs(is_slow):
         if end - start >= SHORTEST_STANDSTILL_S * RATE_HZ:
             label[start:end] = STANDSTILL
-    label[evidence.airborne] = AIRBORNE
+    label[airborne] = AIRBORNE
     flights = runs(label == AIRBORNE)
     gaps = zip([0, *(end for _, end in flights)], [*(start for start, _ in flights), len(label)], strict=True)
     for start, end in gaps:  # the parts between two flights, before the first and after the last

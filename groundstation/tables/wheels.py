@@ -13,6 +13,7 @@ from groundstation.tables.table import Flight, Table
 
 SHORTEST_HOLD_S, LONGEST_HOLD_S = 2.0, 10.0
 STEPS_HELD = 3.0
+WHEELS = "weight on wheels"  # name of the flag of a switch
 PX4_LANDED = "raw.vehicle_land_detected"
 NOT_BELIEVED_S = 10.0
 NOT_BELIEVED_HEIGHT_M, NOT_BELIEVED_SLOPE, NOT_BELIEVED_SPEED_MPS = 30.0, 0.02, 5.0
@@ -47,7 +48,7 @@ def contact_of(flight: Flight) -> Contact | None:
     for topic in topics_of_kind("discrete", flight.topics()):
         if flight[topic].has("weight_on_wheels"):
             origin = flight.metadata.get(f"derived.{topic}.weight_on_wheels", "")
-            name = f"landed flag ({origin})" if "land" in origin.lower() else "weight on wheels"
+            name = f"landed flag ({origin})" if "land" in origin.lower() else WHEELS
             return _contact(name, flight[topic], "weight_on_wheels")
     for topic in flight.topics():
         if topic.startswith(PX4_LANDED) and flight[topic].has("landed"):

@@ -17,8 +17,9 @@ from groundstation.base.units import NS_PER_S
 from groundstation.tables import phases as module
 from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.motion import LONGEST_GRID, Motion, motion_of, window_sum
-from groundstation.tables.phases import ALWAYS_ON_GROUND, PHASES, STEP_NS, Phases, flight_phases, ground_mask
+from groundstation.tables.phases import PHASES, STEP_NS, Phases, flight_phases, ground_mask
 from groundstation.tables.table import Flight, Table
+from groundstation.tables.vehicle import ALWAYS_ON_GROUND
 
 Floats = NDArray[np.float64]
 STEP_S = 0.02

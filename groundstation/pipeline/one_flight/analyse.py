@@ -34,8 +34,9 @@ from groundstation.results.roles import HeadingByTrack
 from groundstation.systems import systems
 from groundstation.systems.analysis import Analysis, Found, in_order_of_need
 from groundstation.systems.known import Known
-from groundstation.tables.phases import ALWAYS_ON_GROUND, flight_phases
+from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight
+from groundstation.tables.vehicle import ALWAYS_ON_GROUND
 
 INFO: Severity = "info"
 WARN: Severity = "warn"

@@ -29,9 +29,9 @@ from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.methods.ins_noise import class_names
 from groundstation.tables.headings import positions_for
-from groundstation.tables.phases import ALWAYS_ON_GROUND, YES
 from groundstation.tables.sources import STATED
 from groundstation.tables.table import Flight
+from groundstation.tables.vehicle import ALWAYS_ON_GROUND, KINDS, VEHICLE, YES
 
 if TYPE_CHECKING:
     from groundstation.store.info import StoreInfo
@@ -69,6 +69,7 @@ _FACTS: Mapping[str, Callable[[str], str]] = MappingProxyType(
         "ins_kind": _word_of(*STATED),
         "ins_class": lambda text: _word_of(*class_names())(text),
         ALWAYS_ON_GROUND: _word_of(*YES),
+        VEHICLE: _word_of(*KINDS),
         **dict.fromkeys(("clip.zero_s", "clip.from_s", "clip.to_s"), _number),
         **dict.fromkeys(("reference.parking_heading_deg", "reference.parking_heading_sigma_deg"), _number),
     }
