@@ -179,7 +179,7 @@ def _applies(flight: "Flight", _known: Known) -> bool:
 
 def _sentence(answers: Answers) -> str:
     answer = answer_of(answers, AutopilotHealth)
-    return "" if answer is None else f"autopilot health {answer.verdict}: {answer.sentence}"
+    return "" if answer is None else f"autopilot health {answer.verdict.replace('_', ' ')}: {answer.sentence}"
 
 
 HEALTH = Analysis(

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from groundstation.base.records import Int64Array, frozen
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.health.answer import WHOLE_LOG
+from groundstation.systems.health.logged import is_number
 from groundstation.systems.known import Known
 from groundstation.tables.phases import Phases
 from groundstation.tables.table import Flight
@@ -135,7 +136,7 @@ def _by_landed_flag(flight: Flight) -> Spans:
 
 def _by_flying(flight: Flight) -> Spans:
     """Return when an ArduPilot plane took itself for flying."""
-    if "raw.STAT" not in flight or not flight["raw.STAT"].has("isFlying"):
+    if "raw.STAT" not in flight or not is_number(flight["raw.STAT"], "isFlying"):
         return _none()
     table = flight["raw.STAT"]
     return spans_where(table.time_ns, table.values("isFlying") == 1.0, 10 * NS, "STAT.isFlying")
@@ -149,19 +150,19 @@ def _by_phases(flight: Flight, phases: Phases) -> Spans:
 
 
 def _by_armed(flight: Flight) -> Spans:
-    if "raw.vehicle_status" in flight and flight["raw.vehicle_status"].has("arming_state"):
+    if "raw.vehicle_status" in flight and is_number(flight["raw.vehicle_status"], "arming_state"):
         table = flight["raw.vehicle_status"]
         armed = table.values("arming_state") == 2.0
         return spans_where(table.time_ns, armed, 10 * NS, "vehicle_status.arming_state", "while armed")
-    if "raw.HEARTBEAT" in flight and flight["raw.HEARTBEAT"].has("base_mode"):
+    if "raw.HEARTBEAT" in flight and is_number(flight["raw.HEARTBEAT"], "base_mode"):
         table = flight["raw.HEARTBEAT"]
-        armed = table.values("base_mode").astype(np.int64) & ARMED_BIT != 0
+        armed = np.nan_to_num(table.values("base_mode")).astype(np.int64) & ARMED_BIT != 0
         return spans_where(table.time_ns, armed, 10 * NS, "HEARTBEAT.base_mode", "while armed")
-    if "raw.STAT" in flight and flight["raw.STAT"].has("Armed"):
+    if "raw.STAT" in flight and is_number(flight["raw.STAT"], "Armed"):
         table = flight["raw.STAT"]
         return spans_where(table.time_ns, table.values("Armed") == 1.0, 10 * NS, "STAT.Armed", "while armed")
     for name, field, yes, no in (("ARM", "ArmState", 1.0, 0.0), ("EV", "Id", 10.0, 11.0)):
-        if f"raw.{name}" in flight and flight[f"raw.{name}"].has(field):
+        if f"raw.{name}" in flight and is_number(flight[f"raw.{name}"], field):
             table = flight[f"raw.{name}"]
             told = table.take(np.isin(table.values(field), (yes, no)))
             if not len(told):

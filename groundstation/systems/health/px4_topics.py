@@ -30,13 +30,12 @@ class Topic:
 
     def has(self, *fields: str) -> bool:
         """Tell whether each field has at least one finite value."""
-        return all(
-            field in self.table.columns and bool(np.isfinite(self.table.values(field)).any()) for field in fields
-        )
+        return all(field in self.table.columns and bool(np.isfinite(self.values(field)).any()) for field in fields)
 
     def values(self, field: str) -> FloatArray:
         """Return a field, NaN where it is absent, not in the log, or no number of this world."""
-        if field not in self.table.columns:
+        column = self.table.columns.get(field)
+        if column is None or column.values.dtype.kind not in "fiub":
             return np.full(len(self.table), np.nan)
         value = self.table.values(field)
         return np.where(np.abs(value) < BEYOND_REASON, value, np.nan)

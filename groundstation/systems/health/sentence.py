@@ -3,11 +3,13 @@
 GNSS good, filter healthy, vibration high 12:03-12:09.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 
 from groundstation.systems.health.answer import FIRST, Check
 
 MOST_OTHERS = 2
+MORE = re.compile(r" and \d+ more$")
 MOSTLY = 0.8  # of the time: a longer span is "throughout"
 QUOTED = ("faults", "battery", "gnss", "link")  # checks of which what was said is quoted
 LONGEST = 50  # characters of a message that the sentence quotes
@@ -109,7 +111,7 @@ def _special(check: Check) -> str:
         if fix is not None and fix.red_share == 1.0:
             return "GNSS never had a fix"
     if check.key in QUOTED and check.first_event_s is not None:
-        first = check.reason.partition("; ")[0]
+        first = MORE.sub("", check.reason.partition("; ")[0])
         if len(first) <= LONGEST:
             return f"“{first}”"
     measure = check.decisive

@@ -361,6 +361,19 @@ def _filled(value: float) -> Callable[[Flight], Flight]:
     return change
 
 
+@pytest.mark.parametrize("tables", [old(), new()], ids=["1.10", "1.13"])
+def test_text_in_place_of_numbers_is_not_logged(tables: tuple[Table, ...]) -> None:
+    def change(one: Flight) -> Flight:
+        def words(each: Table) -> Table:
+            return replace(each, columns={key: Column(np.full(len(each), "high")) for key in each.columns})
+
+        kept = ("raw.vehicle_land_detected",)
+        return replace(one, tables={name: each if name in kept else words(each) for name, each in one.tables.items()})
+
+    with pytest.raises(NotAssessableError, match="holds no field"):
+        answered(*tables, changed=change)
+
+
 COLUMNS = sorted({column for one in (*old(), *new()) for column in one.columns})
 
 
