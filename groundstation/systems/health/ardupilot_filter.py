@@ -61,6 +61,7 @@ _FAULTS = {
     6: "sideslip badly conditioned",
     7: "not initialised",
 }
+_NOT_INITIALISED = 7  # bit of the faults: the ratios are zeros then
 _WRAP = 655.36
 _STEP_M = 2.0  # a position that leaves its own velocity by more was reset
 _LARGEST_STEP_S = 0.25
@@ -148,8 +149,10 @@ def _root(table: Table, field: str) -> FloatArray | None:
     if not names:
         return None
     value = np.stack([table.values(one) for one in names])
-    value = np.where(value < 0.0, value + _WRAP, value)
-    return np.asarray(np.max(value, axis=0))
+    value = np.max(np.where(value < 0.0, value + _WRAP, value), axis=0)
+    if is_number(table, "FS"):
+        value = np.where(bit(table.values("FS"), _NOT_INITIALISED) == 1.0, np.nan, value)
+    return np.asarray(value)
 
 
 def _states(lanes: tuple[Logged, ...], used: EstimatorInUse | None, name: str) -> Iterator[tuple[str, Series, str]]:

@@ -73,7 +73,8 @@ def _check(check: Check) -> tuple[Cell, ...]:
     what = with_signs(check.reason or ("" if measure is None else measure.told)) or ABSENT
     if measure is None:
         when = ABSENT if check.first_event_s is None else clock(check.first_event_s)
-        return (check.title, mark, what, ABSENT, ABSENT, when, ABSENT, "level of the message")
+        source = "what the flight shows" if check.key == "settings" else "level of the message"
+        return (check.title, mark, what, ABSENT, ABSENT, when, ABSENT, source)
     return (
         check.title,
         mark,

@@ -23,6 +23,7 @@ from groundstation.base.ardupilot_codes import (
 from groundstation.base.findings import Finding
 from groundstation.base.log_levels import severity_of_level, severity_of_text
 from groundstation.base.printable import printable
+from groundstation.base.units import NS_PER_S
 from groundstation.systems.health.evidence import Event, Grade
 from groundstation.systems.health.logged import is_number, named
 from groundstation.tables.table import Flight, Table
@@ -38,6 +39,7 @@ _OF_CHECK = (
     ("gnss", re.compile(r"\b(?:gps|gnss)\b.*(?:glitch|lost|no fix|jamm|spoof|unhealthy)", re.I)),
     ("battery", re.compile(r"battery", re.I)),
 )
+YAW_RESET, ALIGNED = 62, re.compile(r"in-?flight yaw alignment complete", re.I)
 MOST_TOLD = 12  # kinds of messages that are a finding each
 
 
@@ -128,15 +130,22 @@ def _errors(flight: Flight) -> Iterator[Event]:
 
 
 def _plain_events(flight: Flight) -> Iterator[Event]:
+    """Yield EV records.
+
+    The alignment of yaw that a filter makes in flight by design is no reset.
+    """
     if "raw.EV" not in flight or not is_number(flight["raw.EV"], "Id"):
         return
     table = flight["raw.EV"]
+    aligned = np.array([one.time_ns for one in messages(flight) if ALIGNED.search(one.text)], dtype=np.int64)
     for time_ns, number in zip(table.time_ns.tolist(), table.values("Id").tolist(), strict=True):
         if not np.isfinite(number):
             continue
         kind = int(number)
         check = "resets" if kind in _ESTIMATOR_EVENTS else "switches" if kind in _SWITCH_EVENTS else "faults"
-        yield Event(check, time_ns, event_severity(kind), EVENTS.get(kind, f"event {kind}"), "raw.EV")
+        is_aligned = kind == YAW_RESET and bool(np.any(np.abs(aligned - time_ns) < NS_PER_S))
+        grade: Grade = "info" if is_aligned else event_severity(kind)
+        yield Event(check, time_ns, grade, EVENTS.get(kind, f"event {kind}"), "raw.EV")
 
 
 def _modes(flight: Flight) -> Iterator[Event]:

@@ -357,6 +357,12 @@ def test_text_codes_and_modes_are_graded() -> None:
     }
 
 
+def test_the_alignment_of_yaw_in_flight_is_no_reset() -> None:
+    said_so = texts("raw.MSG", [40.0], "Message", ["EKF2 IMU0 in-flight yaw alignment complete"])
+    made = flight(said_so, table("raw.EV", [40.1, 60.0], Id=62.0))
+    assert [(one.time_ns / NS, one.grade) for one in said(made, "resets")] == [(40.1, "info"), (60.0, "warn")]
+
+
 # Input that is missing or wrong
 
 
