@@ -38,6 +38,7 @@ OPTIONAL = {
         *("ins_error_m", "corrected_error_m"),
     },
     "forecast_growth": {"sigma_m"},
+    "phases": {"proven"},
 }
 BY_TEXT = {"numbers", "flags", "texts", "figure_with_rows"}
 # Arrays of anybody's analysis; the fleet's table of flights, whose columns the analyses list; UTC beside any figure.

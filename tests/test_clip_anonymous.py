@@ -254,6 +254,7 @@ def test_of_the_head_of_a_log_known_keys_with_known_values_stay(tmp_path: Path) 
         "ins_class": "RA-1",
         "ins_kind": "RA-1",
         "always_on_ground": "RA-1",
+        "vehicle": "RA-1",
         "reference.parking_heading_deg": "RA-1",
         "reference.parking_heading_sigma_deg": "0.02",
         "clip.from_s": "RA-1",
@@ -269,7 +270,7 @@ def test_of_the_head_of_a_log_known_keys_with_known_values_stay(tmp_path: Path) 
         "heading_is_track.ins.true_heading_deg": "heading_is_track",
         "reference.parking_heading_sigma_deg": "0.02",
     }
-    facts = {"ins_class": "navigation", "ins_kind": "unaided", "always_on_ground": "true"}
+    facts = {"ins_class": "navigation", "ins_kind": "unaided", "always_on_ground": "true", "vehicle": "rolls"}
     assert facts.items() <= Disguise(SEED).info(replace(info, metadata=facts)).metadata.items()
 
 

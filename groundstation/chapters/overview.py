@@ -4,8 +4,11 @@ Track map, altitude, speed, attitude, phases and the state of GNSS.
 """
 
 from groundstation.chapters.parts import Figure, Section
-from groundstation.results.arrays.flight import Overview, StateLanes
-from groundstation.results.flight import FlightResults
+from groundstation.chapters.wording import clean, percent
+from groundstation.results.arrays.flight import Overview, PhaseSpans, StateLanes
+from groundstation.results.flight import KIND_OF_VEHICLE, PHASES_BY, WHY_THAT_VEHICLE, FlightResults
+
+LEAST_SHARE = 0.005  # of the time: less is not told
 
 FIGURES = (
     *(Figure("overview.track"), Figure("overview.profile")),
@@ -16,4 +19,18 @@ FIGURES = (
 def overview(results: FlightResults) -> Section | None:
     """Return the chapter; None when the flight has no overview."""
     known = results.rows_of(Overview) is not None or results.rows_of(StateLanes) is not None
-    return Section("overview", "Overview of the flight", "", FIGURES) if known else None
+    return Section("overview", "Overview of the flight", _vehicle(results), FIGURES) if known else None
+
+
+def _vehicle(results: FlightResults) -> str:
+    """Return a sentence on the kind of vehicle, and one on phases that are not proven."""
+    kind, why = (results.metadata.get(key, "") for key in (KIND_OF_VEHICLE, WHY_THAT_VEHICLE))
+    if not kind:
+        return ""
+    told = f"Kind of vehicle: {'not known' if kind == 'unknown' else kind} ({clean(why)})."
+    phases = results.rows_of(PhaseSpans)
+    share = 0.0 if phases is None else phases.likely_share()
+    if share < LEAST_SHARE:
+        return told
+    by = clean(results.metadata.get(PHASES_BY, "").removeprefix("none: "))
+    return f"{told} Phases of {percent(share)} of the time are likely by speed and height, not proven: {by}."

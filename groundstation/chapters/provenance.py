@@ -9,7 +9,7 @@ from groundstation.chapters.wording import ABSENT, clean, number
 from groundstation.results.flight import FlightResults, Source
 
 LONG_LISTS = ("parameter.", "units.", "together")  # of autopilot logs, hundreds of them; a chapter tells the last
-DERIVED = "derived."  # a finding tells it
+TOLD = ("derived.", "vehicle.", "phases.")  # by a finding, by the overview
 ON_TOP = ("aircraft", "flight", "start_utc")  # of the page
 MOST_METADATA = 8
 REST = "More metadata in summary.json."
@@ -36,7 +36,7 @@ def provenance(results: FlightResults) -> Section:
     parts: list[Part] = [Facts("Source and files", pairs)]
     if results.metadata:
         listed = sorted(results.metadata.items())
-        own = [pair for pair in listed if not pair[0].startswith((*LONG_LISTS, DERIVED)) and pair[0] not in ON_TOP]
+        own = [pair for pair in listed if not pair[0].startswith((*LONG_LISTS, *TOLD)) and pair[0] not in ON_TOP]
         rows = [(key, value, "") for key, value in own[:MOST_METADATA]]
         if rows:
             parts.append(Facts("Title and kind" if results.is_plan else "Metadata of the log", rows))

@@ -14,6 +14,7 @@ from groundstation.base.records import Int64Array
 from groundstation.base.signals import EVENT_SEPARATOR, topics_of_kind
 from groundstation.results.arrays.flight import GapRows, GnssLanes, LedgerRows, Overview, PhaseSpans, StateLanes
 from groundstation.results.figures import FigureData
+from groundstation.results.flight import KIND_OF_VEHICLE, PHASES_BY, WHY_THAT_VEHICLE
 from groundstation.tables.phases import Phases
 from groundstation.tables.sources import sources_of_kind
 from groundstation.tables.table import Flight, Table
@@ -191,8 +192,25 @@ def _break_at_gaps(columns: dict[str, NDArray[np.float64]], thinned_step_s: floa
 
 
 def phase_figure(phases: Phases) -> PhaseSpans:
-    """Phases of the flight as figure data."""
-    return PhaseSpans(start_s=phases.start_s, end_s=phases.end_s, phase=phases.phase)
+    """Phases of the flight as figure data: the likely ones among those proven."""
+    shown = phases.likely or phases.intervals
+    return PhaseSpans(
+        start_s=np.array([one.start_s for one in shown], dtype=np.float64),
+        end_s=np.array([one.end_s for one in shown], dtype=np.float64),
+        phase=np.array([one.phase for one in shown], dtype="U16"),
+        proven=np.array([one.is_proven for one in shown], dtype=bool),
+    )
+
+
+def phase_facts(phases: Phases) -> dict[str, str]:
+    """Return the kind of vehicle, its reason and the method of the phases, as metadata."""
+    if not phases.likely:
+        return {}
+    return {
+        KIND_OF_VEHICLE: phases.vehicle.kind or "unknown",
+        WHY_THAT_VEHICLE: phases.vehicle.told,
+        PHASES_BY: phases.method,
+    }
 
 
 def state_lanes(flight: Flight) -> StateLanes | None:

@@ -43,6 +43,8 @@ class Source:
     reader: str
 
 
+KIND_OF_VEHICLE = "vehicle.kind"  # keys of the metadata: rolls, flies, walks, floats or unknown
+WHY_THAT_VEHICLE, PHASES_BY = "vehicle.why", "phases.method"
 NAT_NS = np.iinfo(np.int64).min  # numpy's "not a time"
 UTC_OF = {"time_s": "utc", "start_s": "start_utc", "end_s": "end_utc"}  # columns of flight seconds, and their UTC
 

@@ -16,6 +16,7 @@ from groundstation.results.answer import A, Answers, answer_meeting, answer_of
 from groundstation.results.chosen import Interval
 from groundstation.results.installations import Lesson
 from groundstation.tables.phases import Phases
+from groundstation.tables.vehicle import VehicleKind
 
 if TYPE_CHECKING:
     from groundstation.tables.session_assemble import Truth
@@ -61,8 +62,11 @@ class AircraftData:
         teach how the unit sits, and the acceptance groups flights.
     nav_start_utc : str
         When the INS began to navigate, ISO 8601, where the log does not show it; it may lie before the log.
+    vehicle : str
+        ``rolls``, ``flies``, ``walks`` or ``floats``; empty: as the log says or shows. What rolls is always on the
+        ground: nothing need prove it.
     always_on_ground : bool
-        A car: nothing need prove ground contact.
+        The same as a vehicle that rolls.
     """
 
     antenna_arm_m: float | None = number(None, -50.0, 50.0)
@@ -81,16 +85,24 @@ class AircraftData:
     ins_serial: str = ""
     ins_alignment: str = ""
     nav_start_utc: str = ""
+    vehicle: Literal["", VehicleKind] = ""
     always_on_ground: bool = False
 
     def __post_init__(self) -> None:
         check_ranges(self)
+        if self.always_on_ground and self.vehicle not in ("", "rolls"):
+            raise SettingsError("always_on_ground", "true", f"false, or no vehicle = {self.vehicle!r} beside it")
         if self.nav_start_utc:
             try:
                 iso_to_utc_ns(self.nav_start_utc)
             except GroundstationError as error:
                 expected = "ISO 8601 such as 2026-05-04T06:00:00Z"
                 raise SettingsError("nav_start_utc", repr(self.nav_start_utc), expected) from error
+
+    @property
+    def stated_vehicle(self) -> Literal["", VehicleKind]:
+        """Kind of vehicle that the aircraft file states, empty where it states none."""
+        return "rolls" if self.always_on_ground else self.vehicle
 
 
 @dataclass(frozen=True)

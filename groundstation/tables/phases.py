@@ -49,6 +49,17 @@ UNKNOWN, STANDSTILL, TAXI, TAKE_OFF_RUN, AIRBORNE, LANDING_ROLL = range(6)
 DRIVING, WALKING, UNDER_WAY, SOMEWHERE_ON_GROUND, MOVING = range(6, len(PHASES))
 ON_GROUND: dict[VehicleKind | None, int] = {"rolls": DRIVING, "walks": WALKING, "floats": UNDER_WAY}  # else taxi
 
+GROUND_PHASES: tuple[Phase, ...] = (
+    "standstill",
+    "taxi",
+    "take-off run",
+    "landing roll",
+    "driving",
+    "walking",
+    "under way",
+    "on the ground",
+)
+
 STEP_NS = round(NS_PER_S / RATE_HZ)
 LEAST_COVERAGE = 0.5  # share of the flight for which a flag must speak
 RUN_SHARE = 0.25  # a run begins and a roll ends at this share of the speed at lift-off and touch-down

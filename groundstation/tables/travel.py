@@ -125,7 +125,10 @@ def _airspeed_mps(flight: Flight, size: int) -> FloatArray:
 
 
 def _above_ground_m(flight: Flight, speed_mps: FloatArray) -> FloatArray:
-    """Height above the ground as logged; a source that is low on a run without end is stuck and not believed."""
+    """Height above the ground as logged.
+
+    A source that stays low on a run without end is stuck and not believed.
+    """
     size = len(speed_mps)
     sources = [("baro", "height_above_airfield_m"), ("radio_altimeter", "height_m")]
     for kind, name in sources:

@@ -23,6 +23,7 @@ KINDS: tuple[VehicleKind, ...] = get_args(VehicleKind)
 VEHICLE = "vehicle"  # metadata: the head of a log, a profile or the aircraft file
 ALWAYS_ON_GROUND = "always_on_ground"  # the same for "rolls", as it was first called
 STATED_BY = "vehicle.stated_by"  # metadata: who said it, where that is not the log
+CONTRADICTION = "vehicle.contradiction"  # code of the finding
 YES = ("true", "yes", "1")
 
 FIRMWARES: tuple[tuple[str, VehicleKind], ...] = (
@@ -72,10 +73,10 @@ class Vehicle:
     is_stated: bool = False
     contradiction: str = ""
 
-    def __str__(self) -> str:
-        if self.kind is None:
-            return f"not known: {self.why}"
-        return f"{self.kind} ({'stated: ' if self.is_stated else 'found: '}{self.why})"
+    @property
+    def told(self) -> str:
+        """Source of the kind: who stated it, or what it was found by."""
+        return f"stated: {self.why}" if self.is_stated else f"found: {self.why}" if self.kind else self.why
 
 
 def is_stated_to_roll(metadata: Mapping[str, str]) -> bool:

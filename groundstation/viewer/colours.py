@@ -60,6 +60,11 @@ PHASES: Final[dict[str, Colour]] = {
     "take-off run": ORANGE,
     "airborne": SKY,
     "landing roll": PINK,
+    "driving": GREEN,
+    "walking": YELLOW_GREEN,
+    "under way": GREEN,
+    "on the ground": GREY,
+    "moving": LIGHT,
 }
 GNSS_STATES: Final[dict[str, Colour]] = {
     "good": GREEN,

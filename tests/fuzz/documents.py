@@ -110,6 +110,7 @@ ins_class = "i-21"
 ins_kind = "unaided"
 ins_serial = "1234"
 always_on_ground = false
+vehicle = "flies"
 """
 STATIONS = """[[stations]]
 name = "N1"

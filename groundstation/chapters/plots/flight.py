@@ -196,11 +196,17 @@ def profile(results: FlightResults) -> Plot | None:
     return Plot(
         "overview.profile",
         "Altitude, speed and phases",
-        "Ground: phase of flight." + (" Lanes: usability of GNSS." if order else ""),
+        _phase_caption(phases) + (" Lanes: usability of GNSS." if order else ""),
         "Altitude and speed over flight time with phases shaded.",
         tuple(rows),
         tuple(one.name for one in (data, phases, gnss) if one is not None),
     )
+
+
+def _phase_caption(phases: PhaseSpans | None) -> str:
+    if phases is None:
+        return "Nothing tells the phases."
+    return "Ground: phase, likely where it is not proven." if phases.likely_share() else "Ground: phase of flight."
 
 
 def _phases(phases: PhaseSpans) -> Spans:

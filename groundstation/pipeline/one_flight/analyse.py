@@ -36,7 +36,7 @@ from groundstation.systems.analysis import Analysis, Found, in_order_of_need
 from groundstation.systems.known import Known
 from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight
-from groundstation.tables.vehicle import ALWAYS_ON_GROUND
+from groundstation.tables.vehicle import ALWAYS_ON_GROUND, CONTRADICTION, STATED_BY, VEHICLE
 
 INFO: Severity = "info"
 WARN: Severity = "warn"
@@ -94,6 +94,8 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
     thresholds = configuration.thresholds
     gaps = {name: gaps_of(name, flight[name].time_ns, thresholds=thresholds) for name in flight.topics()}
     findings = [*given.findings, *(Finding("warn", "plug_in.system", line) for line in systems().failures)]
+    if known.phases.vehicle.contradiction:
+        findings.append(Finding("warn", CONTRADICTION, known.phases.vehicle.contradiction))
     for analysis in systems().analyses:
         findings += found.findings.get(analysis.name, ())
         findings += (
@@ -105,7 +107,7 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
     return FlightResults(
         flight_id=given.flight_id,
         source=given.source,
-        metadata=flight.metadata,
+        metadata=MappingProxyType({**flight.metadata, **overview.phase_facts(known.phases)}),
         start_utc_ns=flight.start_ns if flight.has_utc else None,
         duration_s=flight.duration_s,
         status=_status(given, findings),
@@ -121,10 +123,12 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
 
 
 def _as_stated(flight: Flight, configuration: Configuration) -> Flight:
-    """Return the flight with the ground contact that the aircraft file states."""
-    if not configuration.settings.aircraft.always_on_ground:
+    """Return the flight with the kind of vehicle that the aircraft file states."""
+    kind = configuration.settings.aircraft.stated_vehicle
+    if not kind:
         return flight
-    return replace(flight, metadata=MappingProxyType({**flight.metadata, ALWAYS_ON_GROUND: "true"}))
+    told = {VEHICLE: kind, ALWAYS_ON_GROUND: "true" if kind == "rolls" else "false", STATED_BY: "aircraft file"}
+    return replace(flight, metadata=MappingProxyType({**flight.metadata, **told}))
 
 
 def seen_by_analyses(flight: Flight, configuration: Configuration) -> Flight:

@@ -59,7 +59,7 @@ def events_of(saved: SavedFlight) -> dict[Event, float]:
     found: dict[Event, float] = {"start": 0.0}
     phases = saved.rows_of(PhaseSpans)
     if phases is not None:
-        start_s, names = phases.start_s.tolist(), phases.phase.tolist()
+        start_s, names = phases.start_s.tolist(), phases.proven_phase().tolist()
         moving = next((row for row, name in enumerate(names) if name not in (AT_REST, UNKNOWN)), 0)
         if moving and names[moving - 1] == AT_REST and math.isfinite(start_s[moving]):
             found["first-movement"] = start_s[moving]

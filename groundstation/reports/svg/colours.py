@@ -34,6 +34,11 @@ SHADES = {
     "take-off run": "#f2b8a0",
     "airborne": "#d3e7f5",
     "landing roll": "#e3cfe6",
+    "driving": "#f6e3b4",
+    "walking": "#e4ecc4",
+    "under way": "#cde8e4",
+    "on the ground": "#ece5d8",
+    "moving": "#dedbee",
 }
 LANE: dict[Emphasis, float] = {"faint": 0.3, "thin": 0.6, "usual": 1.0, "bold": 1.0}  # of a lane
 DOT: dict[Emphasis, float] = {"faint": 0.75, "thin": 0.75, "usual": 0.75, "bold": 1.0}  # of dots, which are many

@@ -5,8 +5,10 @@ Times are flight seconds.
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from groundstation.base.old_paths import name_that_left
-from groundstation.results.arrays.typed import Arrays, Counts, Floats, Texts
+from groundstation.results.arrays.typed import Arrays, Counts, Flags, Floats, Texts
 
 
 class Overview(
@@ -34,11 +36,28 @@ class Overview(
 
 
 class PhaseSpans(Arrays, figure="phases", digits={"start_s": 1, "end_s": 1}):
-    """Phases of the flight."""
+    """Phases of the flight.
+
+    ``proven`` is False where speed and height make a phase likely and nothing proves it. Logs of before all phases but
+    ``unknown`` were proven lack it.
+    """
 
     start_s: Floats
     end_s: Floats
     phase: Texts
+    proven: Flags | None = None
+
+    def proven_phase(self) -> Texts:
+        """Return the phases with ``unknown`` for those that are not proven."""
+        return self.phase if self.proven is None else np.where(self.proven, self.phase, "unknown")
+
+    def likely_share(self) -> float:
+        """Share of the time with a phase that is likely and not proven."""
+        length_s = self.end_s - self.start_s
+        total_s = float(np.sum(length_s))
+        if self.proven is None or total_s <= 0.0:
+            return 0.0
+        return float(np.sum(length_s[~self.proven & (self.phase != "unknown")])) / total_s
 
 
 class GnssLanes(Arrays, figure="gnss_lanes", digits={"start_s": 2, "end_s": 2}):

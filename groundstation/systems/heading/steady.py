@@ -23,6 +23,7 @@ from groundstation.systems.heading.answer import TaxiWind
 from groundstation.systems.heading.settings import HeadingSettings
 from groundstation.systems.known import AircraftClass, AircraftData, SiteData
 from groundstation.tables.table import Flight
+from groundstation.tables.vehicle import is_stated_to_roll
 
 FloatArray = NDArray[np.float64]
 STATED_AT_MPS = 10.0  # crosswind at which the sideslip has a stated sigma
@@ -145,8 +146,8 @@ def aircraft_class_of(flight: Flight, aircraft: AircraftData) -> AircraftClass:
     """
     if aircraft.aircraft_class:
         return aircraft.aircraft_class
-    rolls = flight.metadata.get("vehicle") == "rolls" or flight.metadata.get("always_on_ground") == "true"
-    return "car" if rolls or aircraft.always_on_ground else ""
+    rolls = is_stated_to_roll(flight.metadata) or aircraft.stated_vehicle == "rolls"
+    return "car" if rolls else ""
 
 
 def _logged_wind(flight: Flight, span_s: tuple[float, ...], settings: HeadingSettings) -> TaxiWind | None:

@@ -27,6 +27,7 @@ from groundstation.systems.landing.beacons.approach import (
 )
 from groundstation.systems.landing.beacons.outcome import beacon_landing
 from groundstation.systems.landing.beacons.settings import LandingBeaconsSettings
+from groundstation.tables.phases import GROUND_PHASES
 from groundstation.tables.resample import values_at
 from groundstation.tables.sources import sources_of_kind
 
@@ -128,7 +129,7 @@ def _sampled(flight: "Flight", known: Known, beacons: tuple[Beacon, ...], settin
         time_s=time_s,
         bearings_deg=np.column_stack([_bearings(flight, topic, time_ns, settings) for topic in topics]),
         height_m=of_kind("radio_altimeter", "height_m"),
-        is_airborne=~np.isin(known.phases.at(time_s), ("standstill", "taxi", "take-off run", "landing roll")),
+        is_airborne=~np.isin(known.phases.at(time_s), GROUND_PHASES),
         altitude_m=altitude_m if np.isfinite(altitude_m).any() else of_kind("baro", "pressure_altitude_m"),
         ground_speed_mps=np.hypot(north, east),
         heading_deg=of_kind("ins", "true_heading_deg"),
