@@ -10,7 +10,7 @@ from groundstation.methods.taxi_error.posterior import ErrorPosterior
 from groundstation.results.figures import FigureData
 from groundstation.results.roles import IntervalPart
 from groundstation.systems.heading import figures as drawn
-from groundstation.systems.heading.answer import HeadingResult, Standstill
+from groundstation.systems.heading.answer import HeadingResult, Standstill, seconds_of_segments
 from groundstation.systems.heading.checks import disagreement, held_seconds, variance_ratio
 from groundstation.systems.heading.normality import normality
 from groundstation.systems.heading.references import (
@@ -171,14 +171,15 @@ def _judged_values(
 ) -> JudgedValues:
     used, running = solution.used, solution.running
     begin_s = assessed.end_s if assessed else float(used.time_s[0])  # alignment may end while the aircraft stands
-    interval_s = solution.samples.interval_s
     return JudgedValues(
         precision_deg=float(running.precision_deg[-1]),
         quality_deg=float(running.quality_deg[-1]),
         half_width_deg=0.5 * (error.taxi_interval_deg[1] - error.taxi_interval_deg[0]),
         whole_half_width_deg=error.whole_half_width_deg,
         steady_sigma_deg=error.steady_sigma_deg,
-        taxi_seconds=float(sum(part.end_s - part.start_s + interval_s for part in solution.segments)),
+        taxi_seconds=seconds_of_segments(
+            ((part.start_s, part.end_s) for part in solution.segments), solution.samples.interval_s
+        ),
         normality=normality(solution.without_wind_deg),
         variance=variance_ratio(used, solution.without_wind_deg, assessed, settings.sway_line_s),
         drift_deg_per_h=solution.drift_deg_per_h,
