@@ -74,7 +74,7 @@ def seconds_of_epochs(is_meant: BoolArray, interval_s: float) -> float:
 
 
 def seconds_of_segments(spans_s: Iterable[tuple[float, float]], interval_s: float) -> float:
-    """Return the seconds of straight segments from first to last epoch, the last one's interval included.
+    """Return the seconds of straight segments, from the first epoch to the end of the last.
 
     Unlike :func:`seconds_of_epochs` it counts the few epochs within a segment that are not used.
     """
@@ -276,7 +276,7 @@ class HeadingResult(Answer, OnTaxi, HeadingByTrack, LatencyByTurns):
         return self.platform_error_deg, self.platform_standard_error_deg
 
     def setting(self, name: str, shipped: float) -> float:
-        """Return a setting that the answer rests on, the shipped one where it keeps none of that name."""
+        """Return a setting that the answer rests on; the shipped one where it keeps none."""
         value = self.settings.get(name)
         return shipped if value is None or isinstance(value, str | bool) else value
 

@@ -116,9 +116,8 @@ def build_answer(
         settings=_settings_of(settings, aircraft),
         figures=_figures_of(solution, standstill, settings, error.common_sigma_deg),
     )
-    drift_prior_deg_per_h = drift_prior(aircraft.ins_class, said_of(flight, topics[0], "ins_class"))
     result = _with_arm(_with_steady_terms(plain, error, solution, steady), solution)
-    return _with_references(result, flight, solution, standstill, settings, site, drift_prior_deg_per_h)
+    return _with_references(result, flight, solution, standstill, settings, aircraft, site)
 
 
 def _error_of(solution: Solution, steady: SteadyPrior) -> _Error:
@@ -229,8 +228,8 @@ def _with_references(
     solution: Solution,
     standstill: StandstillData,
     settings: HeadingSettings,
+    aircraft: AircraftData,
     site: SiteData,
-    drift_prior_deg_per_h: float,
 ) -> HeadingResult:
     error, sigma = result.error_deg, result.standard_error_deg
     parking = parking_heading(
@@ -240,7 +239,7 @@ def _with_references(
         site,
         (error - _stepped_deg(solution, standstill), sigma, solution.reference_time_s),
         (solution.drift_deg_per_h, solution.drift_sigma_deg_per_h),
-        drift_prior_deg_per_h,
+        drift_prior(aircraft.ins_class, said_of(flight, result.ins_topic, "ins_class")),
     )
     return replace(
         result,

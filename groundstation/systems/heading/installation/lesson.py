@@ -204,7 +204,7 @@ def _sideslip(heading: HeadingResult, north: float, east: float) -> dict[str, An
 
 
 def _steady_and_mounting(heading: HeadingResult) -> dict[str, float]:
-    """Return the priors of the sideslip that is the same in every direction, and of the mounting."""
+    """Return the priors of the mounting and of sideslip the same in every direction."""
     steady = _stored_number(heading, "aircraft.steady_sideslip_sigma_deg", "steady_sideslip_sigma_deg")
     mounting = _stored_number(heading, "aircraft.mounting_sigma_deg")
     return {
