@@ -144,7 +144,7 @@ class HeadingByTrack:
 
     @property
     def failed_beside_interval(self) -> tuple[str, ...]:
-        """Names of required gates that failed and whose finding ``standard_error_deg`` does not hold."""
+        """Names of failed required gates whose finding ``standard_error_deg`` does not hold."""
         raise NotImplementedError
 
     @property

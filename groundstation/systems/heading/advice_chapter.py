@@ -19,7 +19,10 @@ WHAT_IT_NEEDS = (
 
 
 def remedies(taxi_speed_min_mps: float, taxi_min_s: float) -> Remedies:
-    """Return what mends a missing answer; with shipped settings, since it is the answer that keeps its own."""
+    """Return what mends a missing answer, by the shipped limits.
+
+    The answer is what would keep those of the run.
+    """
     taxi = f"taxi straight above {taxi_speed_min_mps:g} m/s for {taxi_min_s:g} s before take-off"
     return (
         ("ground speed never above", ("Fly", taxi)),

@@ -4,12 +4,14 @@ The basis is the reason for it, and its interval.
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.records import BoolArray
 from groundstation.results.answer import Answer
 from groundstation.results.arrays.typed import found_in
 from groundstation.results.figures import FigureData
@@ -64,6 +66,19 @@ class TaxiSegment:
     mean_speed_mps: float
     error_deg: float
     sigma_deg: float
+
+
+def seconds_of_epochs(is_meant: BoolArray, interval_s: float) -> float:
+    """Return the seconds that epochs stand for, each for the usual interval between them."""
+    return int(np.count_nonzero(is_meant)) * interval_s
+
+
+def seconds_of_segments(spans_s: Iterable[tuple[float, float]], interval_s: float) -> float:
+    """Return the seconds of straight segments, from the first epoch to the end of the last.
+
+    Unlike :func:`seconds_of_epochs` it counts the few epochs within a segment that are not used.
+    """
+    return float(sum(end_s - start_s + interval_s for start_s, end_s in spans_s))
 
 
 @dataclass(frozen=True)
@@ -261,7 +276,7 @@ class HeadingResult(Answer, OnTaxi, HeadingByTrack, LatencyByTurns):
         return self.platform_error_deg, self.platform_standard_error_deg
 
     def setting(self, name: str, shipped: float) -> float:
-        """Return a setting that the answer rests on, the shipped one where it keeps none of that name."""
+        """Return a setting that the answer rests on; the shipped one where it keeps none."""
         value = self.settings.get(name)
         return shipped if value is None or isinstance(value, str | bool) else value
 
@@ -294,4 +309,4 @@ class HeadingResult(Answer, OnTaxi, HeadingByTrack, LatencyByTurns):
         samples = found_in(self.figures, HeadingSamples)
         if samples is None:
             return 0.0
-        return int(np.count_nonzero(samples.is_used)) * float(np.median(np.diff(samples.time_s)))
+        return seconds_of_epochs(samples.is_used, float(np.median(np.diff(samples.time_s))))

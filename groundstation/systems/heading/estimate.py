@@ -5,19 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from groundstation.methods.taxi.samples import HEADING_AND_VELOCITY, HeadingOf, OnGround, logged_heading
+from groundstation.methods.taxi.samples import HeadingOf, OnGround, logged_heading
 from groundstation.results.roles import Delays
 from groundstation.systems.heading.answer import HeadingResult, HeadingStep
 from groundstation.systems.heading.outcome import build_answer
 from groundstation.systems.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.systems.heading.solution import solve
-from groundstation.systems.heading.standstill import find_standstill
 from groundstation.systems.heading.steady import steady_prior
 from groundstation.systems.heading.steps import heading_steps
-from groundstation.systems.heading.taxi import delay_of, straight_taxi
+from groundstation.systems.heading.taxi import taxi_of_flight
 from groundstation.systems.known import AircraftData, SiteData
 from groundstation.tables.phases import Phases
-from groundstation.tables.sources import choose_pair
 from groundstation.tables.table import Flight
 
 
@@ -77,27 +75,26 @@ def estimate_heading_error(
     """
     settings, aircraft = settings or HeadingSettings(), aircraft or AircraftData()
     site, request = site or SiteData(), request or HeadingRequest()
-    ins_topic, gnss_topic = choose_pair(flight, HEADING_AND_VELOCITY, request.ins_topic, request.gnss_topic)
-    delay = delay_of((ins_topic, gnss_topic), latencies, aircraft, settings)
-    antenna = straight_taxi(
-        *(flight, ins_topic, gnss_topic),
+    taxi = taxi_of_flight(
+        flight,
         settings=settings,
+        aircraft=aircraft,
         request=request,
         on_ground=on_ground,
         heading=heading,
+        latencies=latencies,
         phases=phases,
-        gnss_latency_s=delay.latency_s if delay else 0.0,
     )
-    standstill = find_standstill(antenna, settings)
+    antenna, standstill, delay = taxi.samples, taxi.standstill, taxi.delay
     span_s = tuple(float(time_s) for time_s in antenna.time_s[antenna.is_used][[0, -1]])
     steady = steady_prior(flight, span_s, aircraft, settings, site, weather)
-    steps = _steps(flight, ins_topic, heading, (standstill.start_s(antenna), span_s[1]), settings)
+    steps = _steps(flight, taxi.topics[0], heading, (standstill.start_s(antenna), span_s[1]), settings)
     offset_s = max(settings.offset_prior_sigma_s, settings.offset_prior_intervals * antenna.interval_s)
     if delay:  # what its latency leaves of the prior
         offset_s = min(offset_s, delay.sigma_s)
     at_rate = replace(settings, offset_prior_sigma_s=offset_s)  # a slow receiver is later, and differs more
     solution = solve(antenna, standstill, aircraft, at_rate, steady, steps)
-    result = build_answer(flight, (ins_topic, gnss_topic), solution, standstill, settings, aircraft, site, steady)
+    result = build_answer(flight, taxi.topics, solution, standstill, settings, aircraft, site, steady)
     if delay is None:
         return result
     return replace(

@@ -10,7 +10,7 @@ from groundstation.methods.taxi_error.posterior import ErrorPosterior
 from groundstation.results.figures import FigureData
 from groundstation.results.roles import IntervalPart
 from groundstation.systems.heading import figures as drawn
-from groundstation.systems.heading.answer import HeadingResult, Standstill
+from groundstation.systems.heading.answer import HeadingResult, Standstill, seconds_of_segments
 from groundstation.systems.heading.checks import disagreement, held_seconds, variance_ratio
 from groundstation.systems.heading.normality import normality
 from groundstation.systems.heading.references import (
@@ -116,9 +116,8 @@ def build_answer(
         settings=_settings_of(settings, aircraft),
         figures=_figures_of(solution, standstill, settings, error.common_sigma_deg),
     )
-    drift_prior_deg_per_h = drift_prior(aircraft.ins_class, said_of(flight, topics[0], "ins_class"))
     result = _with_arm(_with_steady_terms(plain, error, solution, steady), solution)
-    return _with_references(result, flight, solution, standstill, settings, site, drift_prior_deg_per_h)
+    return _with_references(result, flight, solution, standstill, settings, aircraft, site)
 
 
 def _error_of(solution: Solution, steady: SteadyPrior) -> _Error:
@@ -171,14 +170,15 @@ def _judged_values(
 ) -> JudgedValues:
     used, running = solution.used, solution.running
     begin_s = assessed.end_s if assessed else float(used.time_s[0])  # alignment may end while the aircraft stands
-    interval_s = solution.samples.interval_s
     return JudgedValues(
         precision_deg=float(running.precision_deg[-1]),
         quality_deg=float(running.quality_deg[-1]),
         half_width_deg=0.5 * (error.taxi_interval_deg[1] - error.taxi_interval_deg[0]),
         whole_half_width_deg=error.whole_half_width_deg,
         steady_sigma_deg=error.steady_sigma_deg,
-        taxi_seconds=float(sum(part.end_s - part.start_s + interval_s for part in solution.segments)),
+        taxi_seconds=seconds_of_segments(
+            ((part.start_s, part.end_s) for part in solution.segments), solution.samples.interval_s
+        ),
         normality=normality(solution.without_wind_deg),
         variance=variance_ratio(used, solution.without_wind_deg, assessed, settings.sway_line_s),
         drift_deg_per_h=solution.drift_deg_per_h,
@@ -228,8 +228,8 @@ def _with_references(
     solution: Solution,
     standstill: StandstillData,
     settings: HeadingSettings,
+    aircraft: AircraftData,
     site: SiteData,
-    drift_prior_deg_per_h: float,
 ) -> HeadingResult:
     error, sigma = result.error_deg, result.standard_error_deg
     parking = parking_heading(
@@ -239,7 +239,7 @@ def _with_references(
         site,
         (error - _stepped_deg(solution, standstill), sigma, solution.reference_time_s),
         (solution.drift_deg_per_h, solution.drift_sigma_deg_per_h),
-        drift_prior_deg_per_h,
+        drift_prior(aircraft.ins_class, said_of(flight, result.ins_topic, "ins_class")),
     )
     return replace(
         result,

@@ -1,4 +1,7 @@
-"""Settings and gates of the heading estimator. Every limit of the method stands here."""
+"""Every limit of the heading correction a user may set.
+
+Constants of the method stand beside their use.
+"""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -24,7 +27,9 @@ class HeadingSettings:
 
     # Throughout
     geometry_max: float = number(2.0, 0.0)  # geometric factor (paper)
-    velocity_sigma_max_mps: float = number(0.1, 1e-6)  # receiver's own, without any such factor: the paper's noise
+    velocity_sigma_max_mps: float = number(
+        0.1, 1e-6
+    )  # stated by the receiver, where no factor is logged: the paper's noise
     geometry_share_min: float = number(0.9, 0.0, 1.0)  # of the epochs that would otherwise be used
     integrity_share_min: float = number(0.9, 0.0, 1.0)
     heading_gap_max_s: float = number(1.5, 0.0)  # INS heading is interpolated over no longer gap
@@ -37,10 +42,9 @@ class HeadingSettings:
     standstill_guard_s: float = number(2.0, 0.0)  # cut from both ends: the aircraft starts to move below the limit
     standstill_min_s: float = number(10.0, 0.0)  # paper: 10 to 30 s
     standstill_max_s: float = number(30.0, 0.0)
-    standstill_doubt_mps: float = number(
-        1.0, 0.0
-    )  # shown by GNSS on wheels, the heading quite still: still a standstill
-    standstill_still_deg: float = number(0.1, 0.0)  # what the heading then ranges over in standstill_min_s
+    # Stands on its wheels with the heading still, while GNSS shows up to this speed: a standstill that fails its gate.
+    standstill_doubt_mps: float = number(1.0, 0.0)
+    standstill_still_deg: float = number(0.1, 0.0)  # most that the heading then changes
     speed_of_mean_max_mps: float = number(0.01, 0.0)  # paper
     spectrum_max_s: float = number(300.0, 0.0)  # standstill used for the spectrum of the GNSS error
 

@@ -161,8 +161,7 @@ def solve(
     velocities = _velocities(antenna, standstill, float(used.time_s[0]), settings)
     posterior = error_posterior(thinned, velocities, draws=settings.posterior_draws, seed=settings.posterior_seed)
     weight = sample_weights(differences, posterior.typical())
-    current = np.where(used.time_s >= max((step.time_s for step in steps), default=-np.inf), weight, 0.0)
-    reference_time_s = float(np.sum(current * used.time_s) / np.sum(current)) if current.any() else steps[-1].time_s
+    reference_time_s = _reference_time_s(used.time_s, weight, steps)
     draws = posterior.draws_of_ordinary_parts(DRAWS_FOR_PARTS)
     drift, drift_sigma = _drift(thinned, reference_time_s, draws)
     segments = tuple(_segment(differences, used, used.segment == number, draws) for number in np.unique(used.segment))
@@ -192,6 +191,12 @@ def solve(
         wind_of_parts_deg=_wind_of(parts, differences),
         steps=steps,
     )
+
+
+def _reference_time_s(time_s: FloatArray, weight: FloatArray, steps: tuple[HeadingStep, ...]) -> float:
+    """Return the weighted mean time of the samples after the last step, whose error is told."""
+    current = np.where(time_s >= max((step.time_s for step in steps), default=-np.inf), weight, 0.0)
+    return float(np.sum(current * time_s) / np.sum(current)) if current.any() else steps[-1].time_s
 
 
 def _part(differences: HeadingDifferences, index: slice | BoolArray) -> HeadingDifferences:

@@ -1,16 +1,67 @@
-"""The epochs of straight taxi that the heading is estimated from."""
+"""Straight taxi of a flight: the epochs that the heading is estimated from."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.methods.taxi.delay import KnownDelay, known_delay
 from groundstation.methods.taxi.gating import gate_samples
-from groundstation.methods.taxi.samples import HeadingOf, OnGround, TaxiSamples, pair_samples
+from groundstation.methods.taxi.samples import HEADING_AND_VELOCITY, HeadingOf, OnGround, TaxiSamples, pair_samples
 from groundstation.results.roles import Delays
+from groundstation.systems.heading.answer import seconds_of_epochs
 from groundstation.systems.heading.settings import HeadingRequest, HeadingSettings
+from groundstation.systems.heading.standstill import StandstillData, find_standstill
 from groundstation.systems.known import AircraftData
 from groundstation.tables.phases import Phases
+from groundstation.tables.sources import choose_pair
 from groundstation.tables.table import Flight
+
+
+@dataclass(frozen=True)
+class StraightTaxi:
+    """Straight taxi of a flight and the standstill before it.
+
+    ``topics`` are those of INS and GNSS; ``delay`` of the latter is taken out of ``samples``, whose velocities are
+    those of the antenna.
+    """
+
+    topics: tuple[str, str]
+    delay: KnownDelay | None
+    samples: TaxiSamples
+    standstill: StandstillData
+
+
+def taxi_of_flight(
+    flight: Flight,
+    *,
+    settings: HeadingSettings,
+    aircraft: AircraftData,
+    request: HeadingRequest,
+    on_ground: OnGround | None,
+    heading: HeadingOf | None,
+    latencies: Delays | None,
+    phases: Phases | None,
+) -> StraightTaxi:
+    """Choose the pair, take the delay out, and find straight taxi and standstill.
+
+    Raises
+    ------
+    NotAssessableError
+        Where nothing can be estimated, with the reason.
+    """
+    topics = choose_pair(flight, HEADING_AND_VELOCITY, request.ins_topic, request.gnss_topic)
+    delay = _delay_of(topics, latencies, aircraft, settings)
+    samples = straight_taxi(
+        *(flight, *topics),
+        settings=settings,
+        request=request,
+        on_ground=on_ground,
+        heading=heading,
+        phases=phases,
+        gnss_latency_s=delay.latency_s if delay else 0.0,
+    )
+    return StraightTaxi(topics, delay, samples, find_standstill(samples, settings))
 
 
 def straight_taxi(
@@ -47,7 +98,7 @@ def straight_taxi(
         return gate_samples(paired, settings, request.intervals, phases)
 
     antenna = gated(with_later_runs=settings.runs == "all_ground")
-    if settings.runs == "auto" and antenna.is_used.sum() * antenna.interval_s < settings.taxi_min_s:
+    if settings.runs == "auto" and seconds_of_epochs(antenna.is_used, antenna.interval_s) < settings.taxi_min_s:
         # Too little before take-off: what the whole flight says is worth more, though never a number to type.
         whole = gated(with_later_runs=True)
         antenna = whole if whole.is_used.sum() > antenna.is_used.sum() else antenna
@@ -57,7 +108,7 @@ def straight_taxi(
     return antenna
 
 
-def delay_of(
+def _delay_of(
     pair: tuple[str, str], latencies: Delays | None, aircraft: AircraftData, settings: HeadingSettings
 ) -> KnownDelay | None:
     """Return the latency of GNSS behind the INS to take out.
@@ -71,7 +122,7 @@ def delay_of(
 def _refuse_too_little(samples: TaxiSamples, settings: HeadingSettings) -> None:
     """Refuse an estimate with next to no straight taxi before take-off."""
     is_wanted = samples.is_used if settings.runs == "all_ground" else samples.is_used & ~samples.is_after_lift_off
-    seconds, later = (float(np.sum(mask)) * samples.interval_s for mask in (is_wanted, samples.is_used & ~is_wanted))
+    seconds, later = (seconds_of_epochs(mask, samples.interval_s) for mask in (is_wanted, samples.is_used & ~is_wanted))
     if seconds >= settings.taxi_least_s - 0.5 * samples.interval_s:
         return
     found = f"{seconds:.1f} s of straight taxi" if seconds else "no straight taxi"

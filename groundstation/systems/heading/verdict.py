@@ -152,7 +152,7 @@ def _throughout_gates(
     geometry, integrity = geometry[np.isfinite(geometry)], integrity[np.isfinite(integrity)]
     is_sigma = samples.geometry_name == VELOCITY_SIGMA
     most = settings.velocity_sigma_max_mps if is_sigma else settings.geometry_max
-    geometry = geometry * (most / settings.geometry_max)  # samples store a velocity sigma scaled to it: back to m/s
+    geometry = geometry * (most / settings.geometry_max)  # samples hold a velocity sigma as a factor: back to m/s
     limit = f"at most {most:g} m/s" if is_sigma else f"at most {most:g}"
     name = f"{VELOCITY_SIGMA} of the receiver" if is_sigma else samples.geometry_name or "GDOP"
     changes = values.mode_changes

@@ -133,59 +133,83 @@ def _is_sound(*values: float | None) -> bool:
 
 
 def _of_heading(heading: HeadingResult) -> dict[str, Any]:
-    """Return what the heading correction says, and what was known before it."""
-    settings = heading.settings
+    """Return what the heading correction says, and what was known before it.
 
-    def number(name: str) -> float | None:
-        value = settings.get(name)
-        return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
-
+    ``number_deg`` is None where the stored answer lacks what a lesson needs.
+    """
     low, high = heading.confidence95_deg
-    deciding = number("whole_half_width_max_deg") if settings.get("whole_decides") is not False else None
+    decides = heading.settings.get("whole_decides") is not False
     found: dict[str, Any] = {
         "verdict": heading.verdict,
         "failed": tuple(gate.name for gate in heading.gates if gate.required and gate.state != "passed"),
         "error_deg": heading.error_deg,
         "half_width_deg": 0.5 * (high - low),
         "platform_error_deg": heading.platform_error_deg,
-        "limit_deg": deciding,
+        "limit_deg": _stored_number(heading, "whole_half_width_max_deg") if decides else None,
         "entry_step_deg": heading.entry_step_deg,
         "number_deg": None,
     }
     taxi = next((part for part in heading.interval_parts if part.name == "taxi"), None)
-    wind = () if heading.wind is None else (heading.wind.north_mps, heading.wind.east_mps, heading.wind.sigma_mps)
     if heading.mean_direction is None or taxi is None:
         return found
+    wind = () if heading.wind is None else (heading.wind.north_mps, heading.wind.east_mps, heading.wind.sigma_mps)
     stored = (heading.error_deg, heading.sideslip_deg, taxi.half_width_deg, low, high, *heading.mean_direction, *wind)
     if not (_is_sound(*stored) and taxi.half_width_deg > 0.0):
         return found
+    is_uneven = heading.settings.get("aircraft.taxi_power") == "uneven"
+    uneven_deg = _stored_number(heading, "uneven_power_sigma_deg") if is_uneven else None
+    return (
+        found
+        | {
+            "number_deg": float(wrap_180(heading.error_deg + (heading.sideslip_deg or 0.0))),
+            # that of this flight alone
+            "taxi_sigma_deg": math.hypot(taxi.half_width_deg / NORMAL_95, uneven_deg or 0.0),
+        }
+        | _sideslip(heading, *heading.mean_direction)
+        | _steady_and_mounting(heading)
+    )
+
+
+def _stored_number(heading: HeadingResult, *names: str) -> float | None:
+    """Return the first number that the settings of an answer have under one of these names."""
+    values = (heading.settings.get(name) for name in names)
+    return next((float(one) for one in values if isinstance(one, int | float) and not isinstance(one, bool)), None)
+
+
+def _sideslip(heading: HeadingResult, north: float, east: float) -> dict[str, Any]:
+    """Return the crosswind of the taxi and the prior of its factor.
+
+    ``north`` and ``east`` are the mean direction of motion. The wind of a lesson is from the right: minus that from the
+    left, by which :mod:`groundstation.systems.heading.steady` counts.
+    """
     kind = heading.aircraft_class if heading.aircraft_class in FACTORS else ""
     factor, factor_sigma = next(value for name, value in FACTORS.items() if name == kind)
-    sideslip = number("aircraft.sideslip_sigma_deg")
-    sideslip = number("sideslip_sigma_deg") if sideslip is None else sideslip
-    if sideslip is not None:
-        factor_sigma = sideslip / STATED_AT_MPS
-    north, east = heading.mean_direction
-    wind_sigma = number("ordinary_wind_mps") or ORDINARY_WIND_MPS
-    crosswind = 0.0
+    stated_deg = _stored_number(heading, "aircraft.sideslip_sigma_deg", "sideslip_sigma_deg")
+    if stated_deg is not None:
+        factor_sigma = stated_deg / STATED_AT_MPS
+    from_right_mps = 0.0
+    wind_sigma_mps = _stored_number(heading, "ordinary_wind_mps") or ORDINARY_WIND_MPS
     if heading.wind is not None:
-        wind_sigma = heading.wind.sigma_mps
-        crosswind = heading.wind.north_mps * east - heading.wind.east_mps * north
-    elif sideslip is not None:
-        wind_sigma = sideslip / math.hypot(factor, factor_sigma)
-    steady, mounting = number("aircraft.steady_sideslip_sigma_deg"), number("aircraft.mounting_sigma_deg")
-    steady = number("steady_sideslip_sigma_deg") if steady is None else steady
-    uneven = number("uneven_power_sigma_deg") if settings.get("aircraft.taxi_power") == "uneven" else 0.0
-    return found | {
-        "number_deg": float(wrap_180(heading.error_deg + (heading.sideslip_deg or 0.0))),
-        "taxi_sigma_deg": math.hypot(taxi.half_width_deg / NORMAL_95, uneven or 0.0),  # that of this flight alone
-        "crosswind_mps": crosswind,
-        "crosswind_sigma_mps": wind_sigma * math.hypot(north, east),
+        wind_sigma_mps = heading.wind.sigma_mps
+        from_right_mps = heading.wind.north_mps * east - heading.wind.east_mps * north
+    elif stated_deg is not None:
+        wind_sigma_mps = stated_deg / math.hypot(factor, factor_sigma)
+    return {
+        "crosswind_mps": from_right_mps,
+        "crosswind_sigma_mps": wind_sigma_mps * math.hypot(north, east),
         "aircraft_class": kind,
         "factor": factor,
         "factor_sigma": factor_sigma,
+    }
+
+
+def _steady_and_mounting(heading: HeadingResult) -> dict[str, float]:
+    """Return the priors of the mounting and of sideslip the same in every direction."""
+    steady = _stored_number(heading, "aircraft.steady_sideslip_sigma_deg", "steady_sideslip_sigma_deg")
+    mounting = _stored_number(heading, "aircraft.mounting_sigma_deg")
+    return {
         "steady_sigma_deg": STEADY_DEG if steady is None else steady,
-        "mounting_deg": number("aircraft.mounting_deg") or 0.0,
+        "mounting_deg": _stored_number(heading, "aircraft.mounting_deg") or 0.0,
         "mounting_sigma_deg": MOUNTING_DEG if mounting is None else mounting,
     }
 

@@ -7,6 +7,8 @@ from groundstation.results.installations import NAMED_PROBABILITY
 
 ALIGNMENTS: Mapping[str, float] = {"gyrocompass": 0.1, "stored": 1.0}  # sigma of the heading error, deg, by kind
 UNKNOWN_ALIGNMENT_DEG = 3.0  # wide enough to teach nothing and to move nothing
+# Twice HeadingSettings.mounting_sigma_deg, which no flight corrects: 0.1 does not hold the 0.45 deg between two units
+# in one aircraft (docs/heading.md), and flights narrow this one (docs/installation.md).
 MOUNTING_DEG = 0.2
 STEADY_DEG = 0.05
 GROSS_DEG = 60.0  # of a unit turned round, or one of which nothing is known

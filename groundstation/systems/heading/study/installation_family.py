@@ -4,7 +4,7 @@ Aircraft with mountings, factors and winds, and what their flights show.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,8 +83,53 @@ def draw_fleet(number: int, seed: int, pool: Sequence[TaxiOfPool], aircraft: int
     return [_aircraft(number, seed, place, pool) for place in range(aircraft)]
 
 
+@dataclass(frozen=True)
+class _Airframe:
+    """One aircraft as it is; ``mountings_deg`` are those of its first and second unit."""
+
+    kind: AircraftClass
+    factor: float
+    steady_deg: float
+    mountings_deg: NDArray[np.float64]
+    units: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class _Day:
+    """One flight as drawn: winds from the right as blown and as told, alignment, sights."""
+
+    crosswind_mps: float
+    told_mps: float
+    alignment_deg: float
+    azimuth_sigma_deg: float
+    azimuth_deg: float
+    has_turns: bool
+    stand_deg: float
+
+
 def _aircraft(number: int, seed: int, place: int, pool: Sequence[TaxiOfPool]) -> list[FlownFlight]:
     family, rng = FAMILIES[number], np.random.default_rng((seed, number + 1, place))
+    airframe = _draw_airframe(family, rng)
+    taxis = rng.choice(len(pool), FLIGHTS, replace=False)
+    flown, since = [], 0
+    for flight in range(FLIGHTS):
+        taxi, day, unit = pool[int(taxis[flight])], _draw_day(family, rng), int(airframe.units[flight])
+        is_after = (family.change in ("told", "not told", "turned") and unit == 1) or since > 0
+        since += family.change != "" and (is_after or unit == 1)
+        heading_deg = day.alignment_deg + float(airframe.mountings_deg[unit])
+        lesson = _lesson(family, airframe, taxi, day, heading_deg)
+        named = replace(
+            lesson,
+            flight_id=f"{place:03d}-{flight + 1}",
+            aircraft=f"A{place:03d}",
+            ins_serial=f"S{place:03d}" + ("b" if family.change == "told" and unit else ""),
+            start_utc=f"2026-05-{flight + 1:02d}T06:00:00Z",
+        )
+        flown.append(FlownFlight(named, taxi, heading_deg, day.alignment_deg, since))
+    return flown
+
+
+def _draw_airframe(family: FamilyOfFleets, rng: np.random.Generator) -> _Airframe:
     kind: AircraftClass = CLASSES[int(rng.integers(len(CLASSES)))]
     factor = FACTORS[kind][0] * float(np.exp(FACTOR_SPREAD * rng.standard_normal()))
     steady = float(rng.normal(0.0, STEADY_DEG))
@@ -93,60 +138,54 @@ def _aircraft(number: int, seed: int, place: int, pool: Sequence[TaxiOfPool]) ->
     mountings = rng.normal(0.0, MOUNTING_DEG, 2)
     if family.change == "turned":
         mountings[1] = mountings[0] + TURNED_DEG
-    units = _units(family.change, rng)
-    taxis = rng.choice(len(pool), FLIGHTS, replace=False)
-    stated = FACTORS[kind if family.is_class_stated else ""]
-    flown, since = [], 0
-    for flight in range(FLIGHTS):
-        taxi, unit = pool[int(taxis[flight])], int(units[flight])
-        track_rad = float(rng.uniform(0.0, 2.0 * np.pi))
-        wind, error = rng.normal(0.0, WIND_MPS, 2), rng.normal(0.0, METAR_MPS, 2)
-        crosswind, told = (_from_right(one, track_rad) for one in (wind, wind + error))
-        alignment = float(rng.normal(0.0, alignment_sigma_deg(family.alignment)))
-        azimuth_sigma = float(rng.uniform(0.02, 0.05))
-        azimuth = alignment + float(rng.normal(0.0, azimuth_sigma))
-        has_turns, stand = bool(rng.random() >= 0.2), float(rng.normal(0.0, 0.05))
-        airframe = alignment + float(mountings[unit])
-        half_width = _alone_half_width(taxi, stated, told, family.has_metar)
-        shown = airframe + steady + factor * crosswind + taxi.error_deg
-        is_after = (family.change in ("told", "not told", "turned") and unit == 1) or since > 0
-        since += family.change != "" and (is_after or unit == 1)
-        flown.append(
-            FlownFlight(
-                Lesson(
-                    flight_id=f"{place:03d}-{flight + 1}",
-                    aircraft=f"A{place:03d}",
-                    ins_serial=f"S{place:03d}" + ("b" if family.change == "told" and unit else ""),
-                    start_utc=f"2026-05-{flight + 1:02d}T06:00:00Z",
-                    number_deg=shown,
-                    taxi_sigma_deg=taxi_sigma(taxi),
-                    crosswind_mps=told if family.has_metar else 0.0,
-                    crosswind_sigma_mps=METAR_MPS if family.has_metar else ORDINARY_WIND_MPS,
-                    alignment=family.alignment,
-                    alignment_sigma_deg=alignment_sigma_deg(family.alignment),
-                    azimuth_deg=azimuth if family.has_azimuth and has_turns else None,
-                    azimuth_sigma_deg=azimuth_sigma if family.has_azimuth and has_turns else None,
-                    reference_deg=airframe + stand if family.has_stand else None,
-                    reference_sigma_deg=0.05 if family.has_stand else None,
-                    aircraft_class=kind if family.is_class_stated else "",
-                    factor=stated[0],
-                    factor_sigma=stated[1],
-                    steady_sigma_deg=STEADY_DEG,
-                    mounting_sigma_deg=MOUNTING_DEG,
-                    verdict=_verdict(taxi, half_width),
-                    failed=(*taxi.failed, *([WHOLE] if half_width > LIMIT_DEG else [])),
-                    error_deg=shown - stated[0] * (told if family.has_metar else 0.0),
-                    half_width_deg=half_width,
-                    platform_error_deg=shown - stated[0] * (told if family.has_metar else 0.0),
-                    limit_deg=LIMIT_DEG,
-                ),
-                taxi,
-                airframe,
-                alignment,
-                since,
-            )
-        )
-    return flown
+    return _Airframe(kind, factor, steady, mountings, _units(family.change, rng))
+
+
+def _draw_day(family: FamilyOfFleets, rng: np.random.Generator) -> _Day:
+    track_rad = float(rng.uniform(0.0, 2.0 * np.pi))
+    wind, error = rng.normal(0.0, WIND_MPS, 2), rng.normal(0.0, METAR_MPS, 2)
+    crosswind, told = (_from_right(one, track_rad) for one in (wind, wind + error))
+    alignment = float(rng.normal(0.0, alignment_sigma_deg(family.alignment)))
+    azimuth_sigma = float(rng.uniform(0.02, 0.05))
+    azimuth = alignment + float(rng.normal(0.0, azimuth_sigma))
+    has_turns, stand = bool(rng.random() >= 0.2), float(rng.normal(0.0, 0.05))
+    return _Day(crosswind, told, alignment, azimuth_sigma, azimuth, has_turns, stand)
+
+
+def _lesson(family: FamilyOfFleets, airframe: _Airframe, taxi: TaxiOfPool, day: _Day, heading_deg: float) -> Lesson:
+    """Return the lesson of a flight, not yet named.
+
+    ``heading_deg`` is the true error of its airframe.
+    """
+    factor, factor_sigma = FACTORS[airframe.kind if family.is_class_stated else ""]
+    half_width = _alone_half_width(taxi, (factor, factor_sigma), day.told_mps, family.has_metar)
+    shown = heading_deg + airframe.steady_deg + airframe.factor * day.crosswind_mps + taxi.error_deg
+    told_mps = day.told_mps if family.has_metar else 0.0
+    has_azimuth = family.has_azimuth and day.has_turns
+    return Lesson(
+        *("", "", "", ""),
+        number_deg=shown,
+        taxi_sigma_deg=taxi_sigma(taxi),
+        crosswind_mps=told_mps,
+        crosswind_sigma_mps=METAR_MPS if family.has_metar else ORDINARY_WIND_MPS,
+        alignment=family.alignment,
+        alignment_sigma_deg=alignment_sigma_deg(family.alignment),
+        azimuth_deg=day.azimuth_deg if has_azimuth else None,
+        azimuth_sigma_deg=day.azimuth_sigma_deg if has_azimuth else None,
+        reference_deg=heading_deg + day.stand_deg if family.has_stand else None,
+        reference_sigma_deg=0.05 if family.has_stand else None,
+        aircraft_class=airframe.kind if family.is_class_stated else "",
+        factor=factor,
+        factor_sigma=factor_sigma,
+        steady_sigma_deg=STEADY_DEG,
+        mounting_sigma_deg=MOUNTING_DEG,
+        verdict=_verdict(taxi, half_width),
+        failed=(*taxi.failed, *([WHOLE] if half_width > LIMIT_DEG else [])),
+        error_deg=shown - factor * told_mps,
+        half_width_deg=half_width,
+        platform_error_deg=shown - factor * told_mps,
+        limit_deg=LIMIT_DEG,
+    )
 
 
 def taxi_sigma(taxi: TaxiOfPool) -> float:
