@@ -46,14 +46,33 @@ def _claim(answer: InertialResult, headline: str) -> Claim:
     remark = "INS − GNSS, 95 %; its own drift cannot be seen" if figures else "its own drift cannot be seen"
     left = answer.worst_departure
     if left is not None:
-        flew = answer.filter_of_ins.use.removeprefix("; ")
-        use = (f"{flew[:1].upper()}{typeset(flew[1:])}.",) if flew else ()
-        remark = f"INS − GNSS at most, for {clock(left.end_s - left.start_s)} min:s from {clock(left.start_s)}"
-        value = number(left.largest_m, 0, "m")
-        mark = Mark("warn" if answer.filter_of_ins.flew is False else "bad", "Left GNSS")
-        return Claim(Rank.INERTIAL_OPEN, mark, headline, value, remark, (*use, *sentences), figures, is_danger=True)
+        return _claim_on(answer, left, headline)
     word = "Aided" if answer.kind == "gnss_aided" else "Open"
     return Claim(Rank.INERTIAL_OPEN, Mark("unknown", word), headline, value, remark, sentences, figures)
+
+
+def _claim_on(answer: InertialResult, left: Departure, headline: str) -> Claim:
+    """Return the claim of an INS that left GNSS: red where it flew the aircraft, or may have."""
+    flew = answer.filter_of_ins.use.removeprefix("; ")
+    gate = f"It rejected GNSS in {percent(left.share_rejected, 0)} of the time." if left.share_rejected else ""
+    sentences = (f"{flew[:1].upper()}{typeset(flew[1:])}." if flew else "", gate)
+    usual = answer.difference("position")
+    length = f"for {clock(left.end_s - left.start_s)} min:s from {clock(left.start_s)}"
+    figures = (
+        ("Apart at most", number(left.largest_m, 0, "m"), length),
+        ("Velocity, at most", number(left.largest_mps, 1, "m/s"), "INS − GNSS"),
+        ("Usually apart", "" if usual is None else number(usual.median, 1, "m"), "INS − GNSS, median over the log"),
+    )
+    return Claim(
+        Rank.INERTIAL_OPEN,
+        Mark("warn" if answer.filter_of_ins.flew is False else "bad", "Left GNSS"),
+        headline,
+        number(left.largest_m, 0, "m"),
+        f"INS − GNSS at most, {length}",
+        tuple(filter(None, sentences)),
+        tuple(one for one in figures if one[1] not in ("", ABSENT)),
+        is_danger=True,
+    )
 
 
 def _left(answer: InertialResult, left: Departure) -> str:
