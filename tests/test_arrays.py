@@ -45,6 +45,7 @@ BY_TEXT = {"numbers", "flags", "texts", "figure_with_rows"}
 MAY_ASK_BY_TEXT = {
     *("chapters/generic.py", "chapters/plots/generic.py"),
     "chapters/plots/fleet/trend.py",
+    *(f"systems/health/{name}.py" for name in ("messages", "mavlink", "px4")),  # fields of raw messages
     *("pipeline/verbs/export_figures.py", "results/figures.py", "results/flight.py"),
 }
 

@@ -1,4 +1,4 @@
-"""Coastline of the Earth, without a network: Natural Earth 1:10m, simplified, public domain.
+"""Coastline of the Earth, without a network: Natural Earth 1:10m, simplified.
 
 ``benchmarks/make_coastline.py`` makes ``coastline.npz`` and measures its error against GSHHG 2.3.6: of the line's
 length half is within 0.5 km of the shore, 90 % within 1.8 km. Of the shores 90 % have the line within 3.3 km: islands

@@ -107,7 +107,18 @@ def axis(rng: random.Random) -> Axis:
 def panel(rng: random.Random) -> Panel:
     marks = [mark(rng) for _ in range(rng.randrange(4))]
     legend = rng.choice(["above", "beside", ""])
-    return Panel(marks, axis(rng), axis(rng), rng.choice(["", "T"]), legend, rng.random() < 0.2, rng.choice(["", "no"]))
+    is_map = rng.random() < 0.2
+    unit_m = rng.choice([0.0, 1.0, 1000.0]) if is_map else 0.0
+    return Panel(
+        marks,
+        axis(rng),
+        axis(rng),
+        rng.choice(["", "T"]),
+        legend,
+        is_map,
+        unit_m=unit_m,
+        nothing=rng.choice(["", "no"]),
+    )
 
 
 @pytest.mark.filterwarnings("error")

@@ -25,6 +25,7 @@ BY_HAND = {
     "overview": {"lines", "spans"},  # more series than the page has, and lanes with all states
     "raw": {"lines", "lane"},  # the tables themselves
     "quality": {"thinned", "spans"},  # the same; every gap, where the page widens and counts them
+    "health/tab": {"spans"},  # lanes of the checks, with marks of what happened
     "inertial/tab": {"lane"},  # states of the filter: grounds of the page's panels
     "cooperative/tab": {"lines", "spans"},  # sources heard, lanes of links
     "planning/landing/tab": {"lines"},  # speed of the moving point, beside its space

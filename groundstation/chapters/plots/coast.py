@@ -23,7 +23,7 @@ MARGIN_OF_PLAN = 1.5  # distances on the Earth over those on the plan, a contine
 def coast(
     middle_m: tuple[float, float], half_m: tuple[float, float], origin_deg: tuple[float, float], *, is_polar: bool
 ) -> tuple[Floats, ...]:
-    """Return lines of the coast around the frame of a map, shape (n, 2), metres east and north.
+    """Return lines of the coast around a frame, shape (n, 2), metres east and north.
 
     None where the map is too small for it, or no coast lies in the frame.
 
@@ -58,7 +58,7 @@ def coast(
 def _meets(
     east: Floats, north: Floats, middle_m: tuple[float, float], half_m: tuple[float, float], share: float
 ) -> Flags:
-    """Tell which of the lines between places have a part in the frame; those with a gap have none."""
+    """Tell which lines between places have a part in the frame."""
     meets = np.ones(max(len(east) - 1, 0), dtype=bool)
     with np.errstate(invalid="ignore"):
         for along, middle, half in zip((east, north), middle_m, half_m, strict=True):
@@ -68,7 +68,7 @@ def _meets(
 
 
 def _rings(places: Floats, starts: Flags, step: float) -> list[Floats]:
-    """Return lines with one place where several are nearer than a step, none with more than a painter draws."""
+    """Return lines with one place where several are nearer than a step."""
     keep = np.append(True, np.any(np.diff(np.rint(places / step), axis=0) != 0.0, axis=1)) | starts
     places, begins = places[keep], np.flatnonzero(starts[keep])
     found = []

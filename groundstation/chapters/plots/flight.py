@@ -135,7 +135,7 @@ def _map(time: Floats, north: Floats, east: Floats, used: Flags, title: str, beh
 def _shore(
     panel: Panel, aspects: tuple[float, float], origin_deg: tuple[float, float], *, is_polar: bool
 ) -> Panel | None:
-    """Return a map with the coast beneath it, its axes as they were; None without a coast in its frame."""
+    """Return a map with the coast beneath it; None without a coast in its frame."""
     found = [extent(panel.marks).tolist() for extent in (x_extent, y_extent)]
     ends = [padded(low, high, MARGIN) for low, high in found]
     across, up = (0.5 * panel.unit_m * (high - low) for low, high in ends)

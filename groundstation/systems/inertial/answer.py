@@ -134,7 +134,7 @@ class OwnInnovation:
 
 @dataclass(frozen=True)
 class Departure:
-    """Span in which an aided INS and GNSS were far further apart than usual. Times are flight seconds.
+    """Span of flight seconds with an aided INS and GNSS far further apart than usual.
 
     Parameters
     ----------
@@ -301,7 +301,7 @@ class InertialResult(Answer, KindOfIns, AzimuthByTurns, BestTrack, ErrorsAlongTh
 
     @property
     def worst_departure(self) -> Departure | None:
-        """The departure with the largest distance; those of a filter that had just begun do not count."""
+        """Departure with the largest distance, but for those of a filter that just began."""
         found = [one for one in self.departures if not one.at_start]
         return max(found, key=lambda one: (one.largest_m or 0.0, one.largest_mps or 0.0), default=None)
 

@@ -1,4 +1,4 @@
-"""Departures of an aided INS from GNSS: spans in which the two are far further apart than usual.
+"""Departures of an aided INS from GNSS: spans with both far further apart than usual.
 
 A filter that leaves its receiver shows it in three ways: the distance to GNSS, the difference of the velocities, and
 its own gate, by which it rejects GNSS. Which of the two is wrong the difference alone does not tell.
@@ -57,7 +57,7 @@ def departures(flight: Flight, compared: InsDifferences, own: OwnInnovations | N
 
 
 def filter_of_ins(flight: Flight, topic: str) -> FilterOfIns:
-    """Return which estimator an INS topic is of, and whether it flew the aircraft, as far as the log tells."""
+    """Return the estimator of an INS topic, and whether it flew the aircraft."""
     told = " ".join(text for key, text in sorted(flight.metadata.items()) if key.startswith(f"derived.{topic}."))
     names = _ESTIMATORS.findall(told)
     in_use = estimator_in_use(flight)
@@ -95,7 +95,7 @@ def _beyond(apart: FloatArray, least: float, allowed: FloatArray) -> BoolArray:
 
 
 def _rejected(flight: Flight, own: OwnInnovations, time_s: FloatArray) -> BoolArray:
-    """Tell at which epochs the filter was beyond its own gate, by the newest innovation within a second."""
+    """Tell at which epochs the newest innovation within a second was beyond its gate."""
     gate = np.nan_to_num(own.gate_ratio.reshape(len(own.time_ns), -1)).max(axis=1, initial=0.0)
     own_s = flight.seconds(own.time_ns)
     place = np.searchsorted(own_s, time_s, side="right") - 1
@@ -104,7 +104,7 @@ def _rejected(flight: Flight, own: OwnInnovations, time_s: FloatArray) -> BoolAr
 
 
 def _spans(time_s: FloatArray, bad: BoolArray) -> list[tuple[float, float]]:
-    """Return first and last time of runs of bad epochs, joined over short pauses, without short ones."""
+    """Return the ends of runs of bad epochs, joined over short pauses, none short."""
     at = time_s[bad]
     if not len(at):
         return []

@@ -681,7 +681,7 @@ def test_a_car_is_always_on_the_ground(flight: Flight) -> None:
     car = replace(bare, metadata={**bare.metadata, "always_on_ground": "true"})
     proof, phases = ground_mask(car, car["gnss"].time_ns), flight_phases(car)
     assert proof.mask.all() and proof.method == "said to be always on the ground"
-    assert {part.phase for part in phases.intervals} == {"standstill", "taxi"}
+    assert {part.phase for part in phases.intervals} == {"standstill", "driving"}
     found = estimate(car, on_ground=lambda time_ns: ground_mask(car, time_ns), phases=phases)
     assert found.error_deg == pytest.approx(estimate(flight).error_deg, abs=1e-6)
     assert gate_of(found, "ground").state == "passed"
