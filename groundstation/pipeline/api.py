@@ -250,7 +250,10 @@ class SavedRun(OpenFlight):
 
     @property
     def info(self) -> dict[str, str]:
-        return facts_of(Log(self.folder, self.source, is_store=True), self.results.metadata, self.ledger)
+        from groundstation.results.flight import FOUND_BY_RUN
+
+        logged = {name: fact for name, fact in self.results.metadata.items() if name not in FOUND_BY_RUN}
+        return facts_of(Log(self.folder, self.source, is_store=True), logged, self.ledger)
 
     @cached_property
     def flight(self) -> "Flight":
