@@ -1,4 +1,4 @@
-"""Settings of the autopilot: off their defaults, and checked by the flight itself.
+"""Settings of the autopilot: those off their defaults, and those a flight can check.
 
 What is set comes from the log alone, and so do defaults: a parameter whose default is not logged is not compared.
 """
@@ -61,7 +61,7 @@ def settings_of(flight: Flight, known: Known) -> Settings:
 
 
 def events(settings: Settings, air: Spans) -> tuple[Event, ...]:
-    """Return the settings that were checked as events at the start of what is judged."""
+    """Return the settings that were checked as events, at the start of the judged time."""
     start_ns = int(air.start_ns[0]) if len(air.start_ns) else 0
     return tuple(
         Event("settings", start_ns, "warn" if row.verdict == "warn" else "info", row.told, row.source)
@@ -75,7 +75,10 @@ def _first(parameters: Parameters, names: tuple[str, ...]) -> tuple[str, float] 
 
 
 def _delay(flight: Flight, known: Known, parameters: Parameters) -> Iterator[SettingFound]:
-    """Yield the delay of GNSS that is set beside the one that motion shows."""
+    """Yield the delay of GNSS beside that by motion.
+
+    It is that of the first pair of INS and GNSS that shows one.
+    """
     stated = _first(parameters, _DELAYS)
     if stated is None:
         return
