@@ -25,6 +25,7 @@ from groundstation.results.flight import FlightResults, Source
 from groundstation.simulation.session import simulate_session
 from groundstation.systems.cooperative.analysis import COOPERATIVE
 from groundstation.systems.gnss.answer import GnssReception
+from groundstation.systems.health.answer import AutopilotHealth
 from groundstation.systems.known import SessionKnown
 from groundstation.systems.landing.answer import LandingResult
 from groundstation.systems.landing.arrays import LandingPath, LandingProtection
@@ -297,7 +298,7 @@ def names_of(name: str, results: FlightResults) -> list[tuple[str, ...]]:
         known = (
             one
             for one in results.figure_names
-            if not one.startswith("gnss_")  # whose chapter draws them
+            if not one.startswith(("gnss_", "health_"))  # whose chapters draw them
             and (found := results.figure_with_rows(one)) is not None
             and "time_s" in found.columns
             and columns_by_unit(found)
@@ -315,6 +316,9 @@ def names_of(name: str, results: FlightResults) -> list[tuple[str, ...]]:
     if name == "together.motion":
         joined = results.answer(Together)
         return [(one.label,) for one in joined.agreement] if joined else [("b",)]
+    if name == "health.panels":
+        health = results.answer(AutopilotHealth)
+        return [(one.key,) for one in health.checks] if health else [("gnss",)]
     if name in ("gnss.quality", "gnss.standstill", "gnss.steps", "gnss.pair"):
         reception = results.answer(GnssReception)
         if name == "gnss.pair":
