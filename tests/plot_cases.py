@@ -298,7 +298,7 @@ def names_of(name: str, results: FlightResults) -> list[tuple[str, ...]]:
         known = (
             one
             for one in results.figure_names
-            if not one.startswith("gnss_")  # whose chapter draws them
+            if not one.startswith(("gnss_", "health_"))  # whose chapters draw them
             and (found := results.figure_with_rows(one)) is not None
             and "time_s" in found.columns
             and columns_by_unit(found)
@@ -318,7 +318,7 @@ def names_of(name: str, results: FlightResults) -> list[tuple[str, ...]]:
         return [(one.label,) for one in joined.agreement] if joined else [("b",)]
     if name == "health.panels":
         health = results.answer(AutopilotHealth)
-        return [(check.key,) for check in health.checks] if health else [("vibration",)]
+        return [(one.key,) for one in health.checks] if health else [("gnss",)]
     if name in ("gnss.quality", "gnss.standstill", "gnss.steps", "gnss.pair"):
         reception = results.answer(GnssReception)
         if name == "gnss.pair":

@@ -45,7 +45,7 @@ NAMES = (
     "landing-deviations landing-final landing-motion landing-protection map profile attitude states gaps reference "
     "reference-track reference-claims cooperative-map cooperative-errors cooperative-geometry cooperative-links "
     "control-paths control-measures control-law placement-map placement-accuracy "
-    "health-lanes health-panels gnss-states gnss-quality gnss-standstill gnss-steps gnss-pair"
+    "gnss-states gnss-quality gnss-standstill gnss-steps gnss-pair health-lanes health-panels"
 )
 
 
