@@ -6,13 +6,19 @@ import numpy as np
 import pytest
 
 from groundstation.base.units import ARCMIN_PER_DEG
+from groundstation.chapters.parts import Facts
+from groundstation.plots.marks import Limit
 from groundstation.simulation.taxi import TaxiCase, simulate_taxi, taxi_flight
 from groundstation.systems.heading.advice_chapter import STANDSTILL_S
 from groundstation.systems.heading.answer import MEAN_SPEED_LIMIT, RAW_SPEED_LIMIT
+from groundstation.systems.heading.chapter import heading
 from groundstation.systems.heading.estimate import estimate_heading_error
 from groundstation.systems.heading.gates_answer import GATES, LIMITS
 from groundstation.systems.heading.settings import HeadingSettings
+from groundstation.systems.heading.standstill_plots import components
+from groundstation.systems.heading.standstill_plots import mean_speed as mean_speed_plot
 from groundstation.systems.heading.verdict import gate_bounds
+from tests.report_example import example, heading_result
 
 PAPER = "Markelov, Kostishin, Shukalov, Heading correction of an INS before take-off by satellite navigation, 2015"
 ENOUGH = 1000  # samples
@@ -65,3 +71,13 @@ def test_each_gate_is_a_row_of_the_table_and_has_a_bound() -> None:
         assert kind.required == "never" or kind.failed, f"{kind.name}: no words for a crew"
     names = {field.name for field in fields(HeadingSettings)}
     assert names >= LIMITS and {kind.setting for kind in GATES.values() if kind.setting} <= names
+
+
+def test_figures_show_the_limits_that_the_answer_rests_on() -> None:
+    results = example(heading_result(settings={"standstill_speed_max_mps": 0.3, "speed_of_mean_max_mps": 0.02}))
+    workings = [part for part in heading(results).appendix if isinstance(part, Facts)]
+    assert "Raw samples above 0.3 m/s" in [pair[0] for part in workings for pair in part.pairs]
+    plane, mean_speed = components(results), mean_speed_plot(results)
+    assert plane is not None and "circle: 0.3 m/s; cross" in plane.caption
+    assert mean_speed is not None
+    assert next(mark.value for mark in mean_speed.panels[0].marks if isinstance(mark, Limit)) == 0.02
