@@ -31,7 +31,13 @@ from groundstation.systems.magnetic.flown import find_flown
 from groundstation.systems.magnetic.held_out import Unseen, advantage, find_unseen, hold_out, is_level
 from groundstation.systems.magnetic.iron import bank_bias, heading_errors, parameters_of
 from groundstation.systems.magnetic.manoeuvre import FoundTurn, OppositeTurns, widest_gap_deg
-from groundstation.systems.magnetic.methods import (
+from groundstation.systems.magnetic.other_conditions import FlownConditions, other_conditions
+from groundstation.systems.magnetic.poisson import IronFit, corrected_heading_deg
+from groundstation.systems.magnetic.readings import Readings, choose_topics
+from groundstation.systems.magnetic.remarks import remarks_on
+from groundstation.systems.magnetic.settings import MagneticSettings
+from groundstation.systems.magnetic.swings import compare_swings, steer_card
+from groundstation.systems.magnetic.three_methods import (
     FORECAST_BANKS_DEG,
     Fits,
     bias_coefficients,
@@ -39,12 +45,6 @@ from groundstation.systems.magnetic.methods import (
     method_rows,
     recommend,
 )
-from groundstation.systems.magnetic.other_conditions import FlownConditions, other_conditions
-from groundstation.systems.magnetic.poisson import IronFit, corrected_heading_deg
-from groundstation.systems.magnetic.readings import Readings, choose_topics
-from groundstation.systems.magnetic.remarks import remarks_on
-from groundstation.systems.magnetic.settings import MagneticSettings
-from groundstation.systems.magnetic.swings import compare_swings, steer_card
 from groundstation.systems.magnetic.verdict import build_gates, decide
 from groundstation.tables.phases import Phases, flight_phases
 from groundstation.tables.table import Flight
