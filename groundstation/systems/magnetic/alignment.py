@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from groundstation.base.units import S_PER_H
 from groundstation.results.roles import AzimuthByTurns, HeadingByTrack
 from groundstation.systems.known import AircraftData
 from groundstation.systems.magnetic.answer import Alignment, AlignmentSource, SourceName
@@ -17,7 +18,6 @@ from groundstation.systems.magnetic.before_lift_off import GroundRuns
 from groundstation.systems.magnetic.gyros import GyroDrift
 from groundstation.systems.magnetic.settings import MagneticSettings
 
-S_PER_H = 3600.0
 BELIEVED_SIGMAS = 3.0  # of gyro drift and prior together: further off the rates are not those the INS navigates with
 
 

@@ -6,6 +6,7 @@ It also tells what the correction leaves over.
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
+from groundstation.base.angles import FloatArray
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
@@ -28,6 +29,12 @@ METHOD_TITLES: dict[MethodName, str] = {
 }
 ADVISORY = "Advisory, not a release to service."
 DEVIATION_CSV, STEER_CARD = "deviation.csv", "steer_card.pdf"  # in the folder of a flight that has one
+
+
+def vector_of(values: FloatArray) -> Vector:
+    """Forward, right and down of an array, shape (3,)."""
+    forward, right, down = values.tolist()
+    return forward, right, down
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,11 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
 from groundstation.base.records import BoolArray
+from groundstation.base.units import S_PER_H
 from groundstation.methods.roles import HeadingOnGround
 from groundstation.results.roles import AzimuthByTurns, Delays, HeadingByTrack
 from groundstation.systems.known import AircraftData
-from groundstation.systems.magnetic.alignment import S_PER_H, align, refused
+from groundstation.systems.magnetic.alignment import align, refused
 from groundstation.systems.magnetic.answer import (
     Alignment,
     BankBias,
@@ -29,7 +30,7 @@ from groundstation.systems.magnetic.earth import earth_field
 from groundstation.systems.magnetic.figures import draw, parts_of
 from groundstation.systems.magnetic.flown import find_flown
 from groundstation.systems.magnetic.held_out import Unseen, advantage, find_unseen, hold_out, is_level
-from groundstation.systems.magnetic.iron import bank_bias, heading_errors, parameters_of
+from groundstation.systems.magnetic.iron import bank_bias, curve_rms, heading_errors, parameters_of
 from groundstation.systems.magnetic.manoeuvre import FoundTurn, OppositeTurns, widest_gap_deg
 from groundstation.systems.magnetic.other_conditions import FlownConditions, other_conditions
 from groundstation.systems.magnetic.poisson import IronFit, corrected_heading_deg
@@ -242,7 +243,7 @@ def _biases(fits: Fits) -> tuple[BankBias, ...]:
     iron, earth = fits.forecast.iron, fits.forecast.earth
     banks = [(bank, False) for bank in FORECAST_BANKS_DEG] + [(fits.bank_deg, True)]
     return tuple(
-        BankBias(bank, _rms(bank_bias(iron, earth.horizontal_nt, earth.down_nt, bank, fits.pitch_deg)), is_flown)
+        BankBias(bank, curve_rms(bank_bias(iron, earth.horizontal_nt, earth.down_nt, bank, fits.pitch_deg)), is_flown)
         for bank, is_flown in sorted(banks)
     )
 
@@ -263,7 +264,3 @@ def _a_parts(fits: Fits, alignment: Alignment, declination_sigma_deg: float) -> 
         SigmaPart("wander of roll and pitch", math.sqrt(float(fits.wander[0, 0]))),
         SigmaPart("bank bias", math.hypot(float(bias[0]), math.sqrt(float(bias_covariance[0, 0])))),
     )
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))

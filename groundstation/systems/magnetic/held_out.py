@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.base.records import BoolArray
+from groundstation.base.units import S_PER_H
 from groundstation.methods import harmonics
-from groundstation.systems.magnetic.alignment import S_PER_H
 from groundstation.systems.magnetic.answer import Alignment, HeldOut
 from groundstation.systems.magnetic.apply import corrected_by_table
 from groundstation.systems.magnetic.compass_table import CompassTable, bin_of
@@ -147,15 +147,23 @@ def advantage(unseen: Unseen, of_first_deg: FloatArray, of_second_deg: FloatArra
     return float(np.mean(gain)) / spread * float(np.sqrt(len(gain))) if spread > 0.0 else 0.0
 
 
+def stretch_numbers(time_s: FloatArray, length_s: float) -> NDArray[np.intp]:
+    """Return the number of the stretch of each sample, from 0, shape (n,).
+
+    A stretch ends after ``length_s`` or where a step is longer than ``LONGEST_STEP_S``.
+    """
+    is_first = np.diff(time_s, prepend=-np.inf) > LONGEST_STEP_S
+    since_s = time_s - time_s[is_first][np.cumsum(is_first) - 1]
+    return np.asarray(np.cumsum(is_first | (np.diff(since_s // length_s, prepend=0.0) > 0.0)) - 1)
+
+
 def _of_stretches(unseen: Unseen, values: FloatArray) -> FloatArray:
     """Average values (n,) over stretches of level flight.
 
     Each is ``STRETCH_S`` long or what there is of it.
     """
     time_s = unseen.readings.time_s
-    is_first = np.diff(time_s, prepend=-np.inf) > LONGEST_STEP_S
-    since_s = time_s - time_s[is_first][np.cumsum(is_first) - 1]
-    number = np.cumsum(is_first | (np.diff(since_s // STRETCH_S, prepend=0.0) > 0.0)) - 1
+    number = stretch_numbers(time_s, STRETCH_S)
     count = np.bincount(number)
     seconds = np.bincount(number, np.minimum(np.diff(time_s, prepend=time_s[0]), LONGEST_STEP_S))
     return np.asarray((np.bincount(number, values) / np.maximum(count, 1))[seconds >= SHORTEST_S])

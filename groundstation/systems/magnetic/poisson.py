@@ -32,6 +32,14 @@ class EarthField:
     down_nt: float
     is_modelled: bool = True
 
+    @property
+    def per_tilt(self) -> float:
+        """Return the heading error that a small error of roll or pitch makes, as its multiple: Z / H, tan(dip).
+
+        Roll turns the vertical field Z into the horizontal, angle x Z / H in C; pitch does in B.
+        """
+        return abs(self.down_nt) / self.horizontal_nt if self.horizontal_nt > 0.0 else 0.0
+
 
 @dataclass(frozen=True)
 class DipShift:

@@ -31,7 +31,9 @@ NO_CIRCULAR = (
 )
 WANDER_IN_A_TO_E = np.array([0.3, 1.0, 1.0, 0.3, 0.3])  # what wanders with the turn rate goes into A, D, E
 WANDER_FREEDOM = 4.0  # what the settings say of the wander counts as so many stretches
-WANDER_S = 500.0  # twice a correlation time: in a figure that lasts longer the wander averages out as its inverse
+# Twice a correlation time of the wander of roll and pitch: over a longer figure it averages out as the inverse. 250 s
+# lies between the 120 and the 400 s of docs/magnetic-family.md; FLIGHT_WANDER_S takes another time for the same wander.
+FIGURE_WANDER_S = 500.0
 TELLING_SIGMAS = 2.0  # held-out errors that differ by less may do so by chance
 FORECAST_BANKS_DEG = (10.0, 20.0, 30.0)
 
@@ -75,17 +77,9 @@ def fit_all(
             modulus = replace(modulus, reason=f"{reason}: condition number {modulus.condition_number:.3g}")
     bias = np.zeros(360) if attitude.reason else bank_bias(attitude.iron, *_strengths(found), bank, pitch)
     seconds = float(np.sum(np.minimum(np.diff(figure.time_s), LONGEST_STEP_S)))
-    wander_deg = _wander_deg(attitude, unseen, settings) * math.sqrt(min(1.0, WANDER_S / max(seconds, 1.0)))
-    wander = np.diag((wander_deg * _per_attitude(found) * WANDER_IN_A_TO_E) ** 2)
+    wander_deg = _wander_deg(attitude, unseen, settings) * math.sqrt(min(1.0, FIGURE_WANDER_S / max(seconds, 1.0)))
+    wander = np.diag((wander_deg * found.per_tilt * WANDER_IN_A_TO_E) ** 2)
     return Fits(table, bias, attitude, modulus, pitch, bank, wander_deg, wander)
-
-
-def _per_attitude(earth: EarthField) -> float:
-    """Return how much heading error a small error of roll makes: Z / H.
-
-    Roll turns the vertical field Z into the horizontal, angle x Z / H in C; pitch does in B.
-    """
-    return abs(earth.down_nt) / earth.horizontal_nt if earth.horizontal_nt > 0.0 else 0.0
 
 
 def _wander_deg(fit: IronFit, unseen: Unseen | None, settings: MagneticSettings) -> float:
@@ -95,11 +89,11 @@ def _wander_deg(fit: IronFit, unseen: Unseen | None, settings: MagneticSettings)
 
     Source: Gelman et al., Bayesian Data Analysis, 3rd ed. 2013, section 2.6 (scaled inverse chi-square).
     """
-    per_attitude, known = _per_attitude(fit.earth), settings.attitude_wander_deg
-    if fit.reason or unseen is None or per_attitude <= 0.0:
+    per_tilt, known = fit.earth.per_tilt, settings.attitude_wander_deg
+    if fit.reason or unseen is None or per_tilt <= 0.0:
         return known
     spread_deg, freedom = seen_wander(unseen, fit)
-    seen_deg = spread_deg / per_attitude
+    seen_deg = spread_deg / per_tilt
     return math.sqrt((WANDER_FREEDOM * known**2 + freedom * seen_deg**2) / (WANDER_FREEDOM + freedom))
 
 
