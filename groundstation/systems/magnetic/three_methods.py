@@ -12,11 +12,11 @@ from groundstation.systems.magnetic.answer import Method, MethodName
 from groundstation.systems.magnetic.compass_table import CompassTable, fit_to_circle
 from groundstation.systems.magnetic.held_out import (
     LONGEST_STEP_S,
-    Left,
+    Remaining,
     Unseen,
-    left_by_iron,
-    left_by_nothing,
-    left_by_table,
+    remaining_by_iron,
+    remaining_by_table,
+    remaining_uncorrected,
     seen_wander,
 )
 from groundstation.systems.magnetic.iron import Iron, bank_bias, derivatives, level_coefficients
@@ -114,8 +114,8 @@ def method_rows(
     bias, bias_covariance = bias_coefficients(fits, a_sigma_deg)
     covariance = table.covariance + np.diag(bias**2) + bias_covariance + fits.wander
     covariance[0, 0] += a_sigma_deg**2
-    before = left_by_nothing(unseen).rms_deg if unseen else None
-    after = left_by_table(unseen, table, deviation_deg, fits.bias_deg) if unseen else None
+    before = remaining_uncorrected(unseen).rms_deg if unseen else None
+    after = remaining_by_table(unseen, table, deviation_deg, fits.bias_deg) if unseen else None
     by_table = Method("compass_table", "fitted", "", table.samples, 720, held_out_before_deg=before)
     return (
         _with(by_table, after, values, covariance),
@@ -193,7 +193,7 @@ def _by_iron(
     values, covariance = level_coefficients(fit.iron, spread, *_strengths(fit.earth), fits.pitch_deg)
     if not is_modulus:
         covariance = covariance + fits.wander
-    row = _with(row, left_by_iron(unseen, fit, a_sigma_deg) if unseen else None, values, covariance)
+    row = _with(row, remaining_by_iron(unseen, fit, a_sigma_deg) if unseen else None, values, covariance)
     if not is_modulus:
         return row
     seen = {letter: value for letter, value in row.coefficients_deg.items() if letter != "A"}
@@ -201,20 +201,20 @@ def _by_iron(
     return replace(row, coefficients_deg=seen, coefficients_sigma_deg=sigma)
 
 
-def _with(row: Method, left: Left | None, values: FloatArray, covariance: FloatArray) -> Method:
+def _with(row: Method, remaining: Remaining | None, values: FloatArray, covariance: FloatArray) -> Method:
     variance = np.diag(covariance)
     row = replace(
         row,
         coefficients_deg=dict(zip(LETTERS, map(float, values), strict=True)),
         coefficients_sigma_deg=dict(zip(LETTERS, map(float, np.sqrt(variance)), strict=True)),
     )
-    if left is None:
+    if remaining is None:
         return row
     return replace(
         row,
-        held_out_after_deg=left.rms_deg,
-        held_out_mean_deg=left.mean_deg,
-        held_out_mean_sigma_deg=left.mean_sigma_deg,
+        held_out_after_deg=remaining.rms_deg,
+        held_out_mean_deg=remaining.mean_deg,
+        held_out_mean_sigma_deg=remaining.mean_sigma_deg,
     )
 
 
