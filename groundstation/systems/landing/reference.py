@@ -103,7 +103,7 @@ def sensitivity_of(
 def fits(sensitivity: Sensitivity) -> bool:
     """Tell whether a localizer may serve as reference.
 
-    It may unless its sense or width is surely another.
+    A localizer may unless its sense or width is surely another.
     """
     if sensitivity.ratio is None or sensitivity.sigma is None:
         return True
@@ -290,7 +290,7 @@ def _steps(positions: Positions, used: Rows, runway: RunwayUsed) -> FloatArray:
 def _drifting(place: FloatArray) -> FloatArray:
     """Return the covariance of an error that drifts from one uniform value to another.
 
-    It is over the covariance of one uniform error; ``place`` is in [0, 1].
+    The covariance is a multiple of that of one uniform error; ``place`` is in [0, 1].
     """
     return np.asarray(0.5 + np.outer(1.0 - place, 1.0 - place) + np.outer(place, place))
 

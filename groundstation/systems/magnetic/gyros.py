@@ -1,6 +1,6 @@
 """Drift of the three gyros from the standstill before flight.
 
-It is what they show beyond the rotation of the earth.
+The drift is what the gyros show beyond the rotation of the earth.
 """
 
 from dataclasses import dataclass
@@ -78,7 +78,7 @@ def _still(time_s: FloatArray, phases: Phases, start_s: float, end_s: float) -> 
 def _earth_along_body(table: Table) -> FloatArray:
     """Return the mean rotation of the earth along forward, right, down, deg/h, shape (3,).
 
-    It is cos latitude north, -sin latitude down.
+    The rotation is cos latitude north, -sin latitude down.
     """
     latitude_rad = np.deg2rad(float(np.mean(table.values("latitude_deg"))))
     north, down = EARTH_DEG_PER_H * np.cos(latitude_rad), -EARTH_DEG_PER_H * np.sin(latitude_rad)

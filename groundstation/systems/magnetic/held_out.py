@@ -135,8 +135,8 @@ def remaining_by_iron(unseen: Unseen, fit: IronFit, azimuth_sigma_deg: float) ->
 def seen_wander(unseen: Unseen, fit: IronFit) -> tuple[float, int]:
     """Return the sigma of the iron's residual from stretch to stretch, deg.
 
-    Also returns its degrees of freedom. It is what roll and pitch of the INS wander by times Z / H, or
-    whatever else changes as slowly: the field along the way, a load that is switched.
+    Degrees of freedom come with it. This spread is what roll and pitch of the INS wander by, times Z / H, or whatever
+    else changes as slowly: the field along the way, a load that is switched.
     """
     left = _of_stretches(unseen, unseen.error_deg(corrected_heading_deg(fit.iron, unseen.readings)))
     return (float(np.std(left, ddof=1)), len(left) - 1) if len(left) > 1 else (0.0, 0)
@@ -145,7 +145,7 @@ def seen_wander(unseen: Unseen, fit: IronFit) -> tuple[float, int]:
 def advantage(unseen: Unseen, of_first_deg: FloatArray, of_second_deg: FloatArray) -> float:
     """Return by how many sigma a second error's mean square is smaller than that of a first.
 
-    It is judged stretch by stretch. 0 where fewer than three stretches tell.
+    The two are compared stretch by stretch. 0 where fewer than three stretches tell.
     """
     gain = _of_stretches(unseen, of_first_deg**2 - of_second_deg**2)
     spread = float(np.std(gain, ddof=1)) if len(gain) > 2 else 0.0
@@ -165,7 +165,7 @@ def stretch_numbers(time_s: FloatArray, length_s: float) -> NDArray[np.intp]:
 def _of_stretches(unseen: Unseen, values: FloatArray) -> FloatArray:
     """Average values (n,) over stretches of level flight.
 
-    Each is ``STRETCH_S`` long or what there is of it.
+    A stretch is ``STRETCH_S`` long or what there is of it.
     """
     time_s = unseen.readings.time_s
     number = stretch_numbers(time_s, STRETCH_S)

@@ -81,9 +81,7 @@ def heading_errors(
 ) -> FloatArray:
     """Return the error of the uncorrected heading in each bin of it, shape (360,), at a bank.
 
-    The heading is magnetic.
-
-    It is that in the middle of the bin.
+    Heading and bins are magnetic; the error is that in the middle of the bin.
     """
     field = _fields_nt(horizontal_nt, down_nt, bank_deg, pitch_deg)
     level = np.full(1, bank_deg), np.full(1, pitch_deg)
@@ -97,7 +95,7 @@ def heading_errors(
 def _fields_nt(horizontal_nt: float, down_nt: float, bank_deg: float, pitch_deg: float) -> FloatArray:
     """Return the earth's field in the body on every heading, shape (720, 3).
 
-    It is the same for the hundreds of irons of a fit.
+    The field is the same for the hundreds of irons of a fit.
     """
     level = np.full(len(HEADINGS_DEG), bank_deg), np.full(len(HEADINGS_DEG), pitch_deg)
     return frozen(field_in_body(horizontal_nt, down_nt, HEADINGS_DEG, *level))
@@ -106,7 +104,7 @@ def _fields_nt(horizontal_nt: float, down_nt: float, bank_deg: float, pitch_deg:
 def bank_bias(iron: Iron, horizontal_nt: float, down_nt: float, bank_deg: float, pitch_deg: float = 0.0) -> FloatArray:
     """Return the bias of the average of opposite banks against level flight, shape (360,).
 
-    It grows as bank squared.
+    The bias grows as bank squared.
     """
     at = [heading_errors(iron, horizontal_nt, down_nt, bank, pitch_deg) for bank in (bank_deg, -bank_deg, 0.0)]
     return wrap_180(0.5 * (at[0] + at[1]) - at[2])

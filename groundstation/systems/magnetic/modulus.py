@@ -1,6 +1,6 @@
 """Prior art: iron from the constancy of the field's modulus, without any heading.
 
-It is nearly blind at small banks.
+The modulus is nearly blind at small banks.
 """
 
 import numpy as np

@@ -64,7 +64,7 @@ def other_conditions(
 def _pitch_flown(flown: FlownConditions) -> tuple[float, str]:
     """Return the pitch farthest from the figure's that was flown level or stood at.
 
-    It also tells where pitch was, in words.
+    A text comes with it: where pitch was.
     """
     parts = {"in level flight": flown.is_level & ~flown.in_figure, "on the ground": ~flown.is_airborne}
     seen = {name: flown.readings.pitch_deg[rows] for name, rows in parts.items() if np.count_nonzero(rows) > 1}
@@ -114,7 +114,7 @@ def _pitch(flown: FlownConditions, fit: IronFit) -> OtherCondition:
 def _on_ground(flight: Flight, flown: FlownConditions, fit: IronFit) -> OtherCondition | None:
     """Return what the readings on the ground have more than the figure's iron makes.
 
-    It is a steady vector in the body.
+    The difference is taken for a steady vector in the body.
     """
     rows = np.flatnonzero(~flown.is_airborne)
     left = flown.readings.take(rows)

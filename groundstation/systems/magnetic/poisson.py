@@ -34,7 +34,7 @@ class EarthField:
 
     @property
     def per_tilt(self) -> float:
-        """Return the heading error that a small error of roll or pitch makes, as its multiple: Z / H, tan(dip).
+        """Return the heading error per error of roll or pitch: Z / H, the tan of dip.
 
         Roll turns the vertical field Z into the horizontal, angle x Z / H in C; pitch does in B.
         """
@@ -241,7 +241,7 @@ def _field(
 def _strength_covariance(iron: Iron, per_down: FloatArray, field: _Field) -> FloatArray:
     """Return what the error of the strength adds to the covariance of the iron.
 
-    It does so through Z at a given H and by itself.
+    The strength adds through Z at a given H and by itself.
     """
     per_strength = np.zeros(len(per_down))
     per_strength[: AXES * AXES] = -iron.soft.ravel()
@@ -308,7 +308,7 @@ def _solved(readings: Readings, earth: EarthField, settings: MagneticSettings) -
 def _influence(scaled: FloatArray, scale: FloatArray, residual: FloatArray, weight: FloatArray) -> FloatArray:
     """Return what each reading does to the parameters, shape (n, k).
 
-    They are in the order of :meth:`Iron.vector`.
+    Parameters are in the order of :meth:`Iron.vector`.
     """
     bread = np.linalg.pinv(scaled.T @ (scaled * weight[:, None]))
     of_unit = (scaled * weight[:, None]) @ bread / scale
@@ -319,7 +319,7 @@ def _influence(scaled: FloatArray, scale: FloatArray, residual: FloatArray, weig
 def _columns(readings: Readings, earth: EarthField, settings: MagneticSettings) -> tuple[FloatArray, float]:
     """Return what multiplies the parameters of an axis.
 
-    It is the field along the body, 1, and the current where it varies.
+    Columns are the field along the body, 1, and the current where it varies.
     """
     heading = wrap_180(readings.true_heading_deg - earth.declination_deg)
     field = field_in_body(earth.horizontal_nt, earth.down_nt, heading, readings.roll_deg, readings.pitch_deg)

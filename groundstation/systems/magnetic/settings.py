@@ -48,7 +48,7 @@ class MagneticSettings:
     turned_min_deg: float = number(60.0, 1.0, 360.0)  # in one turn
     turn_samples_min: int = number(40, 2, 1_000_000)
     altitude_min_m: float = number(1000.0, -1000.0, 20_000.0)  # of a turn
-    altitude_range_max_m: float = number(100.0, 0.1, 10_000.0)  # of opposite turns
+    altitude_range_max_m: float = number(100.0, 0.1, 10_000.0)  # in a turn
     pair_gap_max_s: float = number(900.0, 1.0, 100_000.0)  # between opposite turns
     bin_gap_max_deg: float = number(5.0, 1.0, 90.0)  # a wider gap of a branch is not covered
     coverage_usable: float = number(0.75, 0.1, 1.0)  # share of the circle below which there is no figure

@@ -85,7 +85,7 @@ def fit_all(
 def _wander_deg(fit: IronFit, unseen: Unseen | None, settings: MagneticSettings) -> float:
     """Return the wander of roll and pitch over minutes.
 
-    It is weighed from the settings' and from what level flight beside the figure shows.
+    The wander is weighed from that of the settings and from what level flight beside the figure shows.
 
     Source: Gelman et al., Bayesian Data Analysis, 3rd ed. 2013, section 2.6 (scaled inverse chi-square).
     """
@@ -127,8 +127,8 @@ def method_rows(
 def bias_coefficients(fits: Fits, azimuth_sigma_deg: float) -> tuple[FloatArray, FloatArray]:
     """Return A to E of the forecast bank bias, shape (5,), and their covariance.
 
-    They tell how far the table's may be from level flight. The covariance is that of the iron, with the error of the
-    reference heading.
+    The coefficients tell how far the table's may be from level flight. The covariance is that of the iron, with the
+    error of the reference heading.
     """
     fit = fits.forecast
     if fit is None:
