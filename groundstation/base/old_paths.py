@@ -77,6 +77,7 @@ FILES = {
     "estimators.heading.answer": "systems.heading.outcome",
     "estimators.installation.answer": "systems.heading.installation.outcome",
     "estimators.known": "systems.known",
+    "estimators.magnetic.methods": "systems.magnetic.three_methods",
     "estimators.landing_beacons.answer": "systems.landing.beacons.outcome",
     "estimators.landing_beacons.geometry": "methods.bearings",
     "estimators.landing_ranges.answer": "systems.planning.landing.outcome",

@@ -19,6 +19,7 @@ DEG_PER_RAD = 180.0 / math.pi
 ARCMIN_PER_DEG = 60.0
 NT_PER_GAUSS = 1e5
 NS_PER_S = 1_000_000_000
+S_PER_H = 3600.0
 DOTS_PER_FULL_SCALE = 2.0  # full scale of a course deviation indicator
 LIGHT_MPS = 299_792_458.0
 

@@ -126,7 +126,7 @@ class ErrorPart:
 class PositionError:
     """Error of recorded positions across the course, against the localizer.
 
-    It needs no GNSS.
+    The localizer is a reference without GNSS.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ class PositionError:
 class HeightError:
     """Error of a recorded altitude on the roll-out, against the elevation of the runway.
 
-    It needs no GNSS.
+    The elevation is a reference without GNSS.
 
     Parameters
     ----------
@@ -202,8 +202,8 @@ class HeightError:
 class Sensitivity:
     """Ratio of positions across the course to what the localizer shows of them.
 
-    It is 1 where the localizer's sense and width fit. ``ratio`` is None where the aircraft never was far enough off the
-    course for it.
+    The ratio is 1 where the localizer's sense and width fit. ``ratio`` is None where the aircraft never was far enough
+    off the course for it.
     """
 
     ratio: float | None
@@ -215,7 +215,7 @@ class Sensitivity:
 class Protection:
     """Protection levels of a satellite receiver along a final.
 
-    They are no errors: the error itself is not known.
+    Protection levels are no errors: the error itself is not known.
 
     Parameters
     ----------
@@ -279,7 +279,7 @@ class LeftOutApproach:
 class LandingResult(Answer):
     """Approaches of a flight, each against its runway.
 
-    They show accuracy only: integrity and the rest are not shown.
+    The figures show accuracy only: integrity and the rest are not shown.
 
     Parameters
     ----------

@@ -115,7 +115,7 @@ def _why(one: Approach) -> str:
 
 
 def _rests_on(at: StabilisedAt) -> str:
-    """Return the criteria that failed and how many were judged, or why none was."""
+    """Return the criteria that failed, how many were judged, or why none was."""
     failed = [criterion.title for criterion in at.gates if criterion.state == "failed"]
     judged = sum(criterion.state != "not_measured" for criterion in at.gates)
     if failed:

@@ -145,7 +145,7 @@ def _median_direction(track_deg: FloatArray) -> float:
 def _runway(path: FlightPath, row: int, track_deg: float, site: SiteData, settings: LandingSettings) -> Runway | None:
     """Return the runway of the site file that the final leads to.
 
-    It is the one whose threshold the line of the final passes nearest.
+    Of several it is the runway whose threshold the line of the final passes nearest.
     """
     best: tuple[float, Runway] | None = None
     for runway in site.runways:

@@ -119,7 +119,7 @@ def _placed(line: FittedLine, latitude_deg: float, longitude_deg: float, setting
 def _course_line(path: FlightPath, final: Final, settings: LandingSettings) -> FittedLine:
     """Return the course line that positions show.
 
-    It is fitted to the positions less the deviations that the guidance shows.
+    The line is fitted to the positions less the deviations that the guidance shows.
     """
     rows = _line_rows(path, final)
     line = line_through(path, rows)

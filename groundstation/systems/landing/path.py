@@ -149,7 +149,7 @@ def _ground_speed(flight: "Flight", topic: str, time_ns: Int64Array) -> FloatArr
 def slope(time_s: FloatArray, values: FloatArray, over_s: float = SMOOTHED_S) -> FloatArray:
     """Return the rate of change of a stepped signal, NaN where not known.
 
-    It is the difference over ``over_s`` about each time.
+    The rate is the difference over ``over_s`` about each time.
     """
     known = np.isfinite(values)
     if known.sum() < 2:

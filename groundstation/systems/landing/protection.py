@@ -1,6 +1,6 @@
 """Protection levels of a satellite receiver along a final, against alarm limits.
 
-They bound an error; they are not errors.
+Protection levels bound an error; they are not errors.
 """
 
 from typing import TYPE_CHECKING

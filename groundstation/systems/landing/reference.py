@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import MEAN_RADIUS_M, continuous_longitude_deg
 from groundstation.base.records import BoolArray
-from groundstation.base.units import M_PER_NAUTICAL_MILE
+from groundstation.base.units import M_PER_NAUTICAL_MILE, S_PER_H
 from groundstation.results.landing_categories import LINEAR_95
 from groundstation.systems.landing.answer import ErrorPart, PositionError, RunwayUsed, Sensitivity
 from groundstation.systems.landing.geometry import along_and_across, metres_per_dot
@@ -103,7 +103,7 @@ def sensitivity_of(
 def fits(sensitivity: Sensitivity) -> bool:
     """Tell whether a localizer may serve as reference.
 
-    It may unless its sense or width is surely another.
+    A localizer may unless its sense or width is surely another.
     """
     if sensitivity.ratio is None or sensitivity.sigma is None:
         return True
@@ -169,9 +169,15 @@ def position_error(
         rate_sigma_mps=rate_sigma_mps,
         rollout_error_m=None if rolled is None else rolled.mean_m,
         rollout_sigma_m=None if rolled is None else rolled.sigma_m,
-        drift_nmi_per_h=abs(error_m) / M_PER_NAUTICAL_MILE / (flown_s / 3600.0) if flown_s > SHORTEST_DRIFT_S else None,
+        drift_nmi_per_h=abs(error_m) / M_PER_NAUTICAL_MILE / (flown_s / S_PER_H)
+        if flown_s > SHORTEST_DRIFT_S
+        else None,
         parts=tuple(ErrorPart(name, fit.sigma_of(name, AT_THRESHOLD)) for name, _part in parts),
     )
+
+
+def _drift_nmi_per_h(error_m: float, flown_s: float) -> float | None:
+    return abs(error_m) / M_PER_NAUTICAL_MILE / (flown_s / S_PER_H) if flown_s > SHORTEST_DRIFT_S else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,7 +290,7 @@ def _steps(positions: Positions, used: Rows, runway: RunwayUsed) -> FloatArray:
 def _drifting(place: FloatArray) -> FloatArray:
     """Return the covariance of an error that drifts from one uniform value to another.
 
-    It is over the covariance of one uniform error; ``place`` is in [0, 1].
+    The covariance is a multiple of that of one uniform error; ``place`` is in [0, 1].
     """
     return np.asarray(0.5 + np.outer(1.0 - place, 1.0 - place) + np.outer(place, place))
 

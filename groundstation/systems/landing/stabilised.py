@@ -24,7 +24,7 @@ def _from(
 ) -> StabilisedAt:
     """Return the worst values from a check height down to the floor, or to the lowest point.
 
-    They count from the last time the aircraft was above it.
+    Samples count from the last time the aircraft was above that height.
     """
     height = np.where(relative.is_final, relative.height_m, np.nan)
     known = np.isfinite(height)

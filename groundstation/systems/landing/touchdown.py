@@ -51,7 +51,7 @@ def touchdown_of(
 def _sink_rate(flight: "Flight", path: FlightPath, at_s: float) -> float | None:
     """Return the sink rate before a touchdown.
 
-    It is by the radio altimeter where there is one, else by the source of the height.
+    The radio altimeter shows it where there is one, else by the source of the height.
     """
     for topic in topics_of_kind("radio_altimeter", flight.topics()):
         rate = _rate_before(flight.time_s(topic), flight[topic].values("height_m"), at_s)

@@ -3,13 +3,15 @@
 A compass swing is about the axis of the airframe, so what is taken off is the error of the *airframe's* heading: the
 answer of the heading analysis as it stands, whose interval needs no mounting. The platform's number would need the
 sigma of the mounting for nothing: the mounting is in the INS heading that taxi compares with the track, and in the one
-that the magnetometer is compared with. Azimuth by turns (system 2) is the platform's: there the mounting is added.
+that the magnetometer is compared with. Azimuth by turns (inertial analysis) is the platform's: there the mounting is
+added.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from groundstation.base.units import S_PER_H
 from groundstation.results.roles import AzimuthByTurns, HeadingByTrack
 from groundstation.systems.known import AircraftData
 from groundstation.systems.magnetic.answer import Alignment, AlignmentSource, SourceName
@@ -17,7 +19,6 @@ from groundstation.systems.magnetic.before_lift_off import GroundRuns
 from groundstation.systems.magnetic.gyros import GyroDrift
 from groundstation.systems.magnetic.settings import MagneticSettings
 
-S_PER_H = 3600.0
 BELIEVED_SIGMAS = 3.0  # of gyro drift and prior together: further off the rates are not those the INS navigates with
 
 
@@ -48,9 +49,9 @@ def align(
 ) -> Alignment:
     """INS heading error carried from where it was seen to the figure.
 
-    On the ground system 1's own answer ``heading`` comes first, with its whole interval and whatever its verdict,
-    unless what refused it is not in that interval; then the run before lift-off. Azimuth by turns is weighed with it
-    by the variances where both agree, and stands alone where the ground says nothing.
+    On the ground ``heading``, the heading analysis's own answer, comes first, with its whole interval and whatever its
+    verdict, unless what refused it is not in that interval; then the run before lift-off. Azimuth by turns is weighed
+    with it by the variances where both agree, and stands alone where the ground says nothing.
 
     error(figure) = error + drift x hours; variance = that of the error + (sigma of drift x hours)^2. The drift that
     the ground shows is weighed against 0 +- ``drift_sigma_deg_per_h``: minutes hardly show any. That of the gyros
@@ -100,8 +101,8 @@ def align(
 def against_heading(alignment: Alignment) -> float | None:
     """Return by how many sigma the alignment, hence A, contradicts the heading analysis.
 
-    None where there is none. Where that analysis aligned, it is compared with the turns that had a say; where it was
-    refused, with what was used.
+    None without a heading analysis. Where that analysis aligned, it is compared with the turns that had a say; where it
+    was refused, with what was used.
     """
     taxi = alignment.source("taxi")
     if taxi is None or taxi.error_deg is None or taxi.sigma_deg is None:
@@ -122,9 +123,9 @@ def _from_ground(
     aircraft: AircraftData,
     settings: MagneticSettings,
 ) -> tuple[AlignmentSource, HeadingByTrack | None]:
-    """Return an answer of system 1 as a source.
+    """Return an answer of the heading analysis as a source.
 
-    Its error is that of the airframe less the mounting that is stated.
+    The error of the source is that of the airframe less the mounting that is stated.
     """
     if found is None or found.ins_topic != ins_topic:
         reason = missing or (
@@ -141,7 +142,7 @@ def _from_ground(
 
 
 def refused(found: HeadingByTrack) -> str:
-    """Return why an answer of system 1 does not align; empty where it does.
+    """Return why an answer of the heading analysis does not align; empty where it does.
 
     Something failed that its interval does not hold.
     """

@@ -1,4 +1,4 @@
-"""System 3 as analyses: deviation from opposite turns, and heading sensor on ground runs."""
+"""Magnetic deviation as analyses: by opposite turns, and heading sensor on ground runs."""
 
 from typing import TYPE_CHECKING
 

@@ -1,11 +1,12 @@
-"""Answer of the magnetic estimator (system 3): deviation found in flight, with its sigma.
+"""Answer of the magnetic estimator: deviation found in flight, with its sigma.
 
-It also tells what the correction leaves over.
+The answer also tells what the correction leaves over.
 """
 
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
+from groundstation.base.angles import FloatArray
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
@@ -30,6 +31,12 @@ ADVISORY = "Advisory, not a release to service."
 DEVIATION_CSV, STEER_CARD = "deviation.csv", "steer_card.pdf"  # in the folder of a flight that has one
 
 
+def vector_of(values: FloatArray) -> Vector:
+    """Forward, right and down of an array, shape (3,)."""
+    forward, right, down = values.tolist()
+    return forward, right, down
+
+
 @dataclass(frozen=True)
 class AlignmentSource:
     """One way in which the flight shows the INS heading error, at the time of the figure.
@@ -52,12 +59,12 @@ class AlignmentSource:
 class Alignment:
     """INS heading error at the time of the figure.
 
-    It is taken off the INS heading before anything is compared with it. ``aligned_error_deg`` and ``aligned_sigma_deg``
-    belong to ``aligned_at_s``, ``error_deg`` and ``sigma_deg`` to ``figure_at_s`` (flight seconds), after the drift of
-    the hours between. ``origin`` says whence. ``speed_min_mps`` is the speed from which on the track may align.
-    ``gyro_*`` are the drifts along forward, right, down at the standstill before flight and their sigmas; None where no
-    rates are logged. ``sources`` lists every way in which the flight shows the error. It is the airframe's, less the
-    mounting that the aircraft file states.
+    The error is taken off the INS heading before anything is compared with it. ``aligned_error_deg`` and
+    ``aligned_sigma_deg`` belong to ``aligned_at_s``, ``error_deg`` and ``sigma_deg`` to ``figure_at_s`` (flight
+    seconds), after the drift of the hours between. ``origin`` says whence. ``speed_min_mps`` is the speed from which on
+    the track may align. ``gyro_*`` are the drifts along forward, right, down at the standstill before flight and their
+    sigmas; None where no rates are logged. ``sources`` lists every way in which the flight shows the error. It is the
+    airframe's, less the mounting that the aircraft file states.
     """
 
     origin: str
@@ -159,7 +166,7 @@ class Coverage:
 class Residual:
     """RMS error of the magnetic heading on the part of the flight that no fit has seen.
 
-    Its mean is included.
+    The mean of the error is included.
     """
 
     before: float
@@ -226,9 +233,9 @@ class Method:
 class PoissonParameters:
     """Iron of the aircraft: hard iron, soft iron, effect of a current.
 
-    They make reading = soft_iron @ field + hard_iron + current_effect x (current - reference). ``field`` is the earth's
-    along the body axes (forward, right, down). Sigmas have the same shapes; ``current_*`` are None where no current was
-    logged, or it did not vary.
+    The parameters make reading = soft_iron @ field + hard_iron + current_effect x (current - reference). ``field`` is
+    the earth's along the body axes (forward, right, down). Sigmas have the same shapes; ``current_*`` are None where no
+    current was logged, or it did not vary.
     """
 
     schema_name: ClassVar[str] = "poisson"
@@ -246,7 +253,7 @@ class PoissonParameters:
 class BankBias:
     """Error that the average of opposite banks has in level flight.
 
-    It is forecast from the fitted iron.
+    The error is forecast from the fitted iron.
     """
 
     bank_deg: float

@@ -123,7 +123,7 @@ def _other_aircraft(results: FlightResults, deviation: Deviation) -> list[Findin
 def _judged(flight: Flight, results: FlightResults, corrected: "CorrectedHeading", known: Known) -> list[Finding]:
     """Return findings on whether the corrected heading is nearer to that of the flight's INS.
 
-    It is compared with the heading before the deviation was added.
+    The comparison is with the heading before the deviation was added.
     """
     from groundstation.systems.magnetic.corrected import judge
 
@@ -152,7 +152,7 @@ def _judged(flight: Flight, results: FlightResults, corrected: "CorrectedHeading
 def ins_error_deg(results: FlightResults, ins_topic: str) -> float:
     """Return the error of the INS heading where it is known.
 
-    It is known at the figure, from taxi, or from turns in flight.
+    The error is known at the figure, from taxi, or from turns in flight.
     """
     from groundstation.systems.magnetic.alignment import refused
 

@@ -8,7 +8,7 @@ from groundstation.base.angles import FloatArray, direction_of
 def levelled_heading_deg(field_nt: FloatArray, roll_deg: FloatArray, pitch_deg: FloatArray) -> FloatArray:
     """Return the magnetic heading in [0, 360), shape (n,), of a levelled magnetometer.
 
-    It is a three-axis magnetometer, levelled by the attitude. The field, shape (n, 3), forward-right-down, is turned
+    A magnetometer of three axes is levelled by the attitude. The field, shape (n, 3), forward-right-down, is turned
     back by roll and pitch; north lies where its horizontal part points.
 
     Examples

@@ -1,6 +1,6 @@
 """Ground before lift-off: where the INS heading may be aligned by the track.
 
-System 1 is run there once more.
+The heading analysis is run there once more.
 """
 
 import math
@@ -28,7 +28,7 @@ NO_LIMIT_MPS = 1000.0  # lift-off ends the run, not a speed
 
 @dataclass(frozen=True)
 class GroundRuns:
-    """Answers of system 1 on the ground, each None where there is none.
+    """Answers of the heading analysis on the ground, each None where there is none.
 
     Parameters
     ----------
@@ -36,9 +36,9 @@ class GroundRuns:
         Of what is faster than ``speed_min_mps`` before lift-off, the take-off run above all; ``why_not`` says why
         there is none. Looked for only where taxi is not what aligns.
     taxi : HeadingByTrack or None
-        Of taxi within the speed limits of system 1; ``why_not_taxi`` likewise.
+        Of taxi within the speed limits of the heading analysis; ``why_not_taxi`` likewise.
     since : str
-        What they begin with, if not with the log.
+        What the answers begin with, if not with the log.
     """
 
     fast: HeadingByTrack | None = None
@@ -53,7 +53,7 @@ class GroundRuns:
 class AlignmentWindow:
     """Window of flight seconds in which the alignment may look.
 
-    It tells whether an event bounds it, and since what it runs.
+    ``is_by_event``: an event bounds the window. ``since``: what it runs from.
     """
 
     start_s: float
@@ -89,10 +89,10 @@ def find_ground_runs(
 ) -> GroundRuns:
     """Find what aligns the INS heading on the ground.
 
-    It is system 1's own answer ``heading``, else the run to lift-off. Where events of the operator bound the alignment,
-    or a correction was entered after the taxi had begun, taxi is judged again between them. The run counts where it is
-    straight and fast enough for the track error allowed; with ``uses_slower_taxi`` it is not looked for where the
-    answer from taxi ``is_enough``.
+    Taxi aligns by ``heading``, the heading analysis's own answer, else the run to lift-off does. Where events of the
+    operator bound the alignment, or a correction was entered after the taxi had begun, taxi is judged again between
+    them. The run counts where it is straight and fast enough for the track error allowed; with ``uses_slower_taxi`` it
+    is not looked for where the answer from taxi ``is_enough``.
     """
     try:
         window = alignment_window(flight, phases, settings)
@@ -135,8 +135,8 @@ def gyros_at_standstill(flight: Flight, ins_topic: str, phases: Phases, settings
 def alignment_window(flight: Flight, phases: Phases, settings: MagneticSettings) -> AlignmentWindow:
     """Return the window up to the first lift-off less a margin.
 
-    It begins with the last ``alignment_event`` and ends with the ``release_event`` after it. A correction entered on
-    board may move the INS heading: what lies before the last one is left out.
+    The window begins with the last ``alignment_event`` and ends with the ``release_event`` after it. A correction
+    entered on board may move the INS heading: what lies before the last one is left out.
 
     Raises
     ------
@@ -172,7 +172,7 @@ def event_times_s(flight: Flight, name: str) -> list[float]:
 
 
 def _gnss_within(flight: Flight, window: AlignmentWindow) -> Flight:
-    """The flight with the GNSS epochs of a window alone: those decide what system 1 looks at."""
+    """The flight with the GNSS epochs of a window alone: they decide what is looked at."""
     cut = {}
     for topic in topics_of_kind("gnss", flight.topics()):
         time_s = flight.time_s(topic)
@@ -186,7 +186,7 @@ def _speed_min_mps(part: Flight, ins_topic: str, settings: MagneticSettings) -> 
     Where the receiver states a larger one, that counts.
     """
     stated = np.zeros(0)
-    with suppress(NotAssessableError):  # said when system 1 is run
+    with suppress(NotAssessableError):  # said when the heading analysis is run
         _ins, gnss = choose_pair(part, HEADING_AND_VELOCITY, ins_topic)
         stated = part[gnss].values("velocity_sigma_mps")
     stated = stated[np.isfinite(stated)]
@@ -201,7 +201,7 @@ def _estimated(
     ins_topic: str,
     speeds_mps: tuple[float, float] | None = None,
 ) -> tuple[HeadingByTrack | None, str]:
-    """Return system 1's answer, or the reason.
+    """Return the answer of the heading analysis, or the reason.
 
     Ground contact is judged by the whole flight, not by the part.
     """

@@ -1,4 +1,4 @@
-"""Chapter on magnetic deviation (system 3).
+"""Chapter on magnetic deviation.
 
 Verdict, coefficients, steer card, and the error left by each correction.
 """

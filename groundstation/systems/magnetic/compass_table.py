@@ -104,7 +104,7 @@ def _fit(
 ) -> tuple[FloatArray, FloatArray]:
     """Fit A to E of the average: half the sum of those of the branches.
 
-    Each bin counts alike as in the table.
+    Bins count alike, as in the table.
     """
     parts = []
     for rows in (right, left):

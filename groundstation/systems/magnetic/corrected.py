@@ -201,7 +201,7 @@ def _by_curve(reading_deg: FloatArray, deviation: Deviation) -> tuple[FloatArray
 def _declination(flight: Flight, unit: Table, at_ns: Int64Array, settings: MagneticSettings) -> tuple[FloatArray, str]:
     """Return the declination at given times and its source; NaN where unknown.
 
-    It is stated, or that of the model of the date.
+    The declination is the stated one, or that of the model of the date.
     """
     if settings.declination_deg is not None:
         return np.full(len(at_ns), settings.declination_deg), "as stated"
@@ -228,7 +228,7 @@ def judge(
 ) -> tuple[Residual, int] | None:
     """Return the RMS heading error in level flight before and after, and the reading count.
 
-    It is of magnetic heading - (INS true heading - declination).
+    The error is magnetic heading - (INS true heading - declination).
 
     Parameters
     ----------

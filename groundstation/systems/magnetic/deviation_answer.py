@@ -148,7 +148,7 @@ def deviation_from_csv(text: str, where: str) -> Deviation:
 def deviation_csv(results: FlightResults) -> str | None:
     """Return the deviation of a flight as a table of 360 rows; None when it has none.
 
-    It is None also when the flight lacks the arrays. Columns: the uncorrected magnetic heading in the middle of its
+    None also when the flight lacks the arrays. Columns: the uncorrected magnetic heading in the middle of its
     bin; what is to be added to it, with its sigma, by the recommended method and by the table of branches; whether both
     branches covered the bin; whose it is. Deviations are those of level flight, east positive.
 

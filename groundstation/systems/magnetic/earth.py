@@ -61,7 +61,7 @@ def _without_model(
 ) -> tuple[FloatArray, DeclinationUsed, EarthField]:
     """Take the strength from the readings: their median.
 
-    It matters to nothing but the unit of the iron.
+    The strength matters to nothing but the unit of the iron.
     """
     strength = float(np.median(np.linalg.norm(readings.field_nt[rows], axis=1)))
     used = DeclinationUsed(stated, settings.declination_sigma_deg, "as stated")

@@ -5,13 +5,15 @@ from collections.abc import Mapping
 from dataclasses import asdict, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
 from groundstation.base.records import BoolArray
+from groundstation.base.units import S_PER_H
 from groundstation.methods.roles import HeadingOnGround
 from groundstation.results.roles import AzimuthByTurns, Delays, HeadingByTrack
 from groundstation.systems.known import AircraftData
-from groundstation.systems.magnetic.alignment import S_PER_H, align, refused
+from groundstation.systems.magnetic.alignment import align, refused
 from groundstation.systems.magnetic.answer import (
     Alignment,
     BankBias,
@@ -28,10 +30,16 @@ from groundstation.systems.magnetic.compass_table import CompassTable, build_tab
 from groundstation.systems.magnetic.earth import earth_field
 from groundstation.systems.magnetic.figures import draw, parts_of
 from groundstation.systems.magnetic.flown import find_flown
-from groundstation.systems.magnetic.held_out import Unseen, advantage, find_unseen, hold_out, is_level
-from groundstation.systems.magnetic.iron import bank_bias, heading_errors, parameters_of
+from groundstation.systems.magnetic.held_out import Unseen, advantage, hold_out, is_level
+from groundstation.systems.magnetic.iron import bank_bias, curve_rms, heading_errors, parameters_of
 from groundstation.systems.magnetic.manoeuvre import FoundTurn, OppositeTurns, widest_gap_deg
-from groundstation.systems.magnetic.methods import (
+from groundstation.systems.magnetic.other_conditions import FlownConditions, other_conditions
+from groundstation.systems.magnetic.poisson import IronFit, corrected_heading_deg
+from groundstation.systems.magnetic.readings import Readings, choose_topics
+from groundstation.systems.magnetic.remarks import remarks_on
+from groundstation.systems.magnetic.settings import MagneticSettings
+from groundstation.systems.magnetic.swings import compare_swings, steer_card
+from groundstation.systems.magnetic.three_methods import (
     FORECAST_BANKS_DEG,
     Fits,
     bias_coefficients,
@@ -39,13 +47,7 @@ from groundstation.systems.magnetic.methods import (
     method_rows,
     recommend,
 )
-from groundstation.systems.magnetic.other_conditions import FlownConditions, other_conditions
-from groundstation.systems.magnetic.poisson import IronFit, corrected_heading_deg
-from groundstation.systems.magnetic.readings import Readings, choose_topics
-from groundstation.systems.magnetic.remarks import remarks_on
-from groundstation.systems.magnetic.settings import MagneticSettings
-from groundstation.systems.magnetic.swings import compare_swings, steer_card
-from groundstation.systems.magnetic.verdict import build_gates, decide
+from groundstation.systems.magnetic.verdict import JudgedValues, build_gates, decide
 from groundstation.tables.phases import Phases, flight_phases
 from groundstation.tables.table import Flight
 
@@ -72,15 +74,15 @@ def estimate_deviation(
         Topics ``ins`` (roll, pitch, true heading) and ``magnetometer``; ``electric`` where there is one.
     settings : MagneticSettings, optional
     heading : HeadingByTrack, optional
-        System 1's answer: aligns the INS heading with its whole interval.
+        Answer of the heading analysis: aligns the INS heading with its whole interval.
     on_ground : HeadingOnGround, optional
-        Looks at the ground run up to lift-off, where the answer of system 1 does not align.
+        Looks at the ground run up to lift-off, where the answer of the heading analysis does not align.
     by_turns : AzimuthByTurns, optional
-        System 2's answer: its azimuth by turns aligns too.
+        Answer of the inertial analysis: its azimuth by turns aligns too.
     latencies : Delays, optional
         Where that of the magnetometer is observed, its times are put back by it.
     kinds : mapping of INS topic to kind, optional
-        ``gnss_aided`` where system 2 found that other sensors correct the INS.
+        ``gnss_aided`` where the inertial analysis found that other sensors correct the INS.
     aircraft : AircraftData, optional
         Its mounting angle is taken off the INS heading, apart from the alignment.
     phases : Phases, optional
@@ -132,11 +134,11 @@ def _answer(
     rows = np.sort(np.concatenate(branches))
     along, declination, earth = earth_field(flight, readings, rows, settings)
     table = build_table(readings.magnetic_heading_deg, readings.compass_error_deg, branches[0], branches[1])
-    unseen, held_out = hold_out(readings, along, is_airborne, figures, alignment, settings) or (None, None)
+    nothing: tuple[None, None, NDArray[np.intp]] = (None, None, np.zeros(0, dtype=np.intp))
+    unseen, held_out, judged = hold_out(readings, along, is_airborne, figures, alignment, settings) or nothing
     fits = fit_all(readings.take(rows), table, earth, unseen, settings)
     deviation = -wrap_180(table.average_deg + declination.value_deg)
-    judged = find_unseen(readings, is_airborne, figures, settings) & is_level(readings, settings) & bool(unseen)
-    part = parts_of(is_airborne, judged, figures)
+    part = parts_of(is_airborne, np.isin(np.arange(len(readings)), judged), figures)
     a_sigma = math.hypot(alignment.sigma_deg, declination.sigma_deg)
     methods = method_rows(fits, unseen, deviation, declination.value_deg, a_sigma)
     biases = _biases(fits)
@@ -149,9 +151,17 @@ def _answer(
     swings = compare_swings(readings, declination.value_deg, figures)
     used = [one.turn for one in turns if one.turn.state == "used"]
     shift = fits.attitude.dip_shift if not fits.attitude.reason else None
-    gates = build_gates(
-        used, swings, coverage, alignment, residual, flown, method, shift.sigmas if shift else None, settings
+    judged_values = JudgedValues(
+        turns=used,
+        swings=swings,
+        coverage=coverage,
+        alignment=alignment,
+        residual=residual,
+        bank_bias=flown,
+        method=method,
+        dip_sigmas=shift.sigmas if shift else None,
     )
+    gates = build_gates(judged_values, settings)
     verdict, reason = decide(gates)
     conditions = FlownConditions(
         readings,
@@ -242,7 +252,7 @@ def _biases(fits: Fits) -> tuple[BankBias, ...]:
     iron, earth = fits.forecast.iron, fits.forecast.earth
     banks = [(bank, False) for bank in FORECAST_BANKS_DEG] + [(fits.bank_deg, True)]
     return tuple(
-        BankBias(bank, _rms(bank_bias(iron, earth.horizontal_nt, earth.down_nt, bank, fits.pitch_deg)), is_flown)
+        BankBias(bank, curve_rms(bank_bias(iron, earth.horizontal_nt, earth.down_nt, bank, fits.pitch_deg)), is_flown)
         for bank, is_flown in sorted(banks)
     )
 
@@ -263,7 +273,3 @@ def _a_parts(fits: Fits, alignment: Alignment, declination_sigma_deg: float) -> 
         SigmaPart("wander of roll and pitch", math.sqrt(float(fits.wander[0, 0]))),
         SigmaPart("bank bias", math.hypot(float(bias[0]), math.sqrt(float(bias_covariance[0, 0])))),
     )
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -17,7 +17,7 @@ from groundstation.tables.table import Flight
 def examine_magnetic(flight: Flight, known: Known, settings: MagneticSettings) -> tuple[Shortfall, ...]:
     """Judge the turns of a flight.
 
-    They must cover the circle, and level flight be there to judge by.
+    Turns must cover the circle, and level flight be there to judge by.
 
     Raises
     ------

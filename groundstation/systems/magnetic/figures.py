@@ -22,9 +22,9 @@ from groundstation.systems.magnetic.arrays import (
 )
 from groundstation.systems.magnetic.compass_table import CENTRES_DEG
 from groundstation.systems.magnetic.manoeuvre import OppositeTurns
-from groundstation.systems.magnetic.methods import Fits
 from groundstation.systems.magnetic.poisson import corrected_heading_deg
 from groundstation.systems.magnetic.readings import Readings
+from groundstation.systems.magnetic.three_methods import Fits
 
 LARGEST = 20_000  # readings drawn: of more, every k-th
 MOST_VECTORS = 4_000  # of the field

@@ -1,6 +1,6 @@
 """Deviation of the installed heading sensor from straight runs on the ground.
 
-It is given by each run, and by all together.
+The deviation is given by each run, and by all together.
 """
 
 from dataclasses import dataclass, field
@@ -79,7 +79,7 @@ class GroundCoefficient:
 class AlongAxis:
     """Part of B and C that opposite runs show.
 
-    It is ``value_deg`` x cos(heading - ``axis_deg``), the axis in [0, 180).
+    The part is ``value_deg`` x cos(heading - ``axis_deg``), the axis in [0, 180).
     """
 
     axis_deg: float
@@ -104,7 +104,7 @@ class Repeat:
 class GroundDeviation(Answer):
     """Errors of the installed heading sensor on straight ground runs.
 
-    They are advisory, not a release to service.
+    The errors are advisory, not a release to service.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Parts of the chapter on magnetic deviation: straight ground runs.
 
-They judge the heading sensor as installed.
+The ground runs judge the heading sensor as installed.
 """
 
 from collections.abc import Sequence

@@ -68,7 +68,7 @@ def gated(
     latencies: Delays | None,
     excluded_s: Sequence[tuple[float, float]],
 ) -> TaxiSamples:
-    """Return the epochs on the ground, gated as system 1 gates taxi.
+    """Return the epochs on the ground, gated as the heading analysis gates taxi.
 
     The magnetic heading stands in the place of the true one.
     """

@@ -147,7 +147,7 @@ def curve(
 def directions_of(heading_deg: FloatArray, within_deg: float) -> list[list[int]]:
     """Group headings by direction, in order of heading; rows of each group.
 
-    Those of a group are no farther than ``within_deg`` from its first.
+    Headings of a group are no farther than ``within_deg`` from its first.
 
     Examples
     --------

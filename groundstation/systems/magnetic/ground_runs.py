@@ -1,8 +1,8 @@
 """Deviation of an installed heading sensor from straight ground runs.
 
 On the wheels the track is where the nose points. For logs without a three-axis magnetometer and without an INS that is
-independent of it: a magnetic heading and GNSS velocity are enough. The runs are found as system 1 finds straight taxi,
-slower and faster ones too.
+independent of it: a magnetic heading and GNSS velocity are enough. The runs are found as the heading analysis finds
+straight taxi, slower and faster ones too.
 """
 
 from collections.abc import Mapping, Sequence
@@ -92,11 +92,9 @@ def estimate_ground_deviation(
     NotAssessableError
         With the reason: no magnetic heading, no velocity, ground contact not proven, no declination, no straight run.
 
-    Notes
-    -----
-    error = magnetic heading + declination - track. On its wheels an aircraft has no drift angle: the track is the true
-    heading of the nose. Noise is that of system 1, correlated over seconds (``interval.py``), each run with an error of
-    its own. A to E are their posterior (``ground_fit.py``).
+    Notes ----- error = magnetic heading + declination - track. On its wheels an aircraft has no drift angle: the track
+    is the true heading of the nose. Noise is that of the heading analysis, correlated over seconds (``interval.py``),
+    each run with an error of its own. A to E are their posterior (``ground_fit.py``).
 
     What it ignores: the GNSS antenna's arm (a run is straight), a declination whose error differs between the places of
     one flight.
@@ -195,7 +193,7 @@ def _why_rejected(
 def _step_deg(table: Table, name: str) -> float | None:
     """Return the step an angle is logged in; None: none.
 
-    It is the largest of those it may be rounded to that holds every value.
+    The step is the largest of those that angles are rounded to that holds every value.
     """
     values = table.values(name)
     known = np.unique(values[np.isfinite(values)])
@@ -287,7 +285,7 @@ def _answer(
 def _logged_variation_deg(flight: Flight, ins_topic: str, epochs: GroundEpochs) -> float | None:
     """Return the mean of true minus magnetic heading that the log's variation makes.
 
-    It is known where the reader made the one from the other with that variation.
+    The mean is known where the reader made the one from the other with that variation.
     """
     names = ("true_heading_deg", "magnetic_heading_deg")
     derived = flight.metadata.get(f"derived.{ins_topic}.true_heading_deg", "")

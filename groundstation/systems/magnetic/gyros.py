@@ -1,6 +1,6 @@
 """Drift of the three gyros from the standstill before flight.
 
-It is what they show beyond the rotation of the earth.
+The drift is what the gyros show beyond the rotation of the earth.
 """
 
 from dataclasses import dataclass
@@ -10,16 +10,15 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.base.records import BoolArray
-from groundstation.base.units import DEG_PER_RAD
+from groundstation.base.units import DEG_PER_RAD, S_PER_H
 from groundstation.methods import harmonics
-from groundstation.systems.magnetic.answer import Vector
+from groundstation.systems.magnetic.answer import Vector, vector_of
 from groundstation.systems.magnetic.attitude import field_in_body
 from groundstation.tables.phases import Phases
 from groundstation.tables.table import Flight, Table
 
 RATES = ("rate_x_dps", "rate_y_dps", "rate_z_dps")
 ATTITUDE = ("true_heading_deg", "roll_deg", "pitch_deg")
-S_PER_H = 3600.0
 EARTH_DEG_PER_H = EARTH_RATE_RADPS * DEG_PER_RAD * S_PER_H
 GUARD_S, LEAST_S, LEAST_SAMPLES = 2.0, 20.0, 20
 SURE_SHARE = 0.5  # of the earth's rate: what is left must be smaller to tell whether the rates hold the earth's
@@ -63,7 +62,7 @@ def gyro_drift(flight: Flight, ins_topic: str, phases: Phases, start_s: float, e
     sigma = np.sqrt(_variance_of_mean(rates) + rounding**2 + missing**2)
     heading, roll, pitch = (table.values(name) for name in ATTITUDE)
     down = np.mean(field_in_body(0.0, 1.0, heading, roll, pitch), axis=0)
-    return GyroDrift(_vector(drift), _vector(sigma), float(down @ drift), float(np.sqrt(down**2 @ sigma**2)))
+    return GyroDrift(vector_of(drift), vector_of(sigma), float(down @ drift), float(np.sqrt(down**2 @ sigma**2)))
 
 
 def _still(time_s: FloatArray, phases: Phases, start_s: float, end_s: float) -> BoolArray:
@@ -79,7 +78,7 @@ def _still(time_s: FloatArray, phases: Phases, start_s: float, end_s: float) -> 
 def _earth_along_body(table: Table) -> FloatArray:
     """Return the mean rotation of the earth along forward, right, down, deg/h, shape (3,).
 
-    It is cos latitude north, -sin latitude down.
+    The rotation is cos latitude north, -sin latitude down.
     """
     latitude_rad = np.deg2rad(float(np.mean(table.values("latitude_deg"))))
     north, down = EARTH_DEG_PER_H * np.cos(latitude_rad), -EARTH_DEG_PER_H * np.sin(latitude_rad)
@@ -108,8 +107,3 @@ def _variance_of_mean(rates: FloatArray) -> FloatArray:
         total = harmonics.long_run(centred[:, None], correlation)[0, 0]
         variances.append(total * harmonics.inflation(len(axis), 1, correlation) / len(axis) ** 2)
     return np.array(variances)
-
-
-def _vector(values: FloatArray) -> Vector:
-    forward, right, down = values.tolist()
-    return forward, right, down

@@ -8,7 +8,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.base.records import frozen
-from groundstation.systems.magnetic.answer import Matrix, PoissonParameters, Vector
+from groundstation.systems.magnetic.answer import Matrix, PoissonParameters, vector_of
 from groundstation.systems.magnetic.attitude import field_in_body, levelled_heading_deg
 from groundstation.systems.magnetic.compass_table import CENTRES_DEG, fit_to_circle
 
@@ -44,7 +44,7 @@ class Iron:
         current = [] if self.current_nt_per_a is None else [self.current_nt_per_a]
         return np.concatenate([self.soft.ravel(), self.hard_nt, *current])
 
-    def with_vector(self, vector: FloatArray) -> "Iron":
+    def withvector_of(self, vector: FloatArray) -> "Iron":
         """The iron of a vector of parameters."""
         current = vector[12:] if self.current_nt_per_a is not None else None
         return Iron(vector[:9].reshape(3, 3), vector[9:12], current, self.current_reference_a)
@@ -66,12 +66,12 @@ def parameters_of(iron: Iron, covariance: FloatArray) -> PoissonParameters:
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     has_current = iron.current_nt_per_a is not None
     return PoissonParameters(
-        _vector(iron.hard_nt),
-        _vector(sigma[9:12]),
+        vector_of(iron.hard_nt),
+        vector_of(sigma[9:12]),
         _matrix(iron.soft),
         _matrix(sigma[:9].reshape(3, 3)),
-        _vector(iron.current_nt_per_a) if iron.current_nt_per_a is not None else None,
-        _vector(sigma[12:15]) if has_current else None,
+        vector_of(iron.current_nt_per_a) if iron.current_nt_per_a is not None else None,
+        vector_of(sigma[12:15]) if has_current else None,
         iron.current_reference_a if has_current else None,
     )
 
@@ -81,9 +81,7 @@ def heading_errors(
 ) -> FloatArray:
     """Return the error of the uncorrected heading in each bin of it, shape (360,), at a bank.
 
-    The heading is magnetic.
-
-    It is that in the middle of the bin.
+    Heading and bins are magnetic; the error is that in the middle of the bin.
     """
     field = _fields_nt(horizontal_nt, down_nt, bank_deg, pitch_deg)
     level = np.full(1, bank_deg), np.full(1, pitch_deg)
@@ -97,7 +95,7 @@ def heading_errors(
 def _fields_nt(horizontal_nt: float, down_nt: float, bank_deg: float, pitch_deg: float) -> FloatArray:
     """Return the earth's field in the body on every heading, shape (720, 3).
 
-    It is the same for the hundreds of irons of a fit.
+    The field is the same for the hundreds of irons of a fit.
     """
     level = np.full(len(HEADINGS_DEG), bank_deg), np.full(len(HEADINGS_DEG), pitch_deg)
     return frozen(field_in_body(horizontal_nt, down_nt, HEADINGS_DEG, *level))
@@ -106,10 +104,15 @@ def _fields_nt(horizontal_nt: float, down_nt: float, bank_deg: float, pitch_deg:
 def bank_bias(iron: Iron, horizontal_nt: float, down_nt: float, bank_deg: float, pitch_deg: float = 0.0) -> FloatArray:
     """Return the bias of the average of opposite banks against level flight, shape (360,).
 
-    It grows as bank squared.
+    The bias grows as bank squared.
     """
     at = [heading_errors(iron, horizontal_nt, down_nt, bank, pitch_deg) for bank in (bank_deg, -bank_deg, 0.0)]
     return wrap_180(0.5 * (at[0] + at[1]) - at[2])
+
+
+def curve_rms(curve_deg: FloatArray) -> float:
+    """RMS of a heading error over the circle."""
+    return float(np.sqrt(np.mean(np.square(curve_deg))))
 
 
 def level_coefficients(
@@ -134,16 +137,11 @@ def derivatives(iron: Iron, function: Callable[[Iron], FloatArray], horizontal_n
     columns = []
     for place in range(len(vector)):
         nudge = np.where(np.arange(len(vector)) == place, step, 0.0)
-        high, low = function(iron.with_vector(vector + nudge)), function(iron.with_vector(vector - nudge))
+        high, low = function(iron.withvector_of(vector + nudge)), function(iron.withvector_of(vector - nudge))
         columns.append((high - low) / (2.0 * step[place]))
     return np.stack(columns, axis=-1)
 
 
-def _vector(values: FloatArray) -> Vector:
-    first, second, third = (float(value) for value in values)
-    return first, second, third
-
-
 def _matrix(values: FloatArray) -> Matrix:
-    first, second, third = (_vector(row) for row in values)
+    first, second, third = (vector_of(row) for row in values)
     return first, second, third

@@ -63,7 +63,7 @@ class OppositeTurns:
 def find_turns(readings: Readings, is_airborne: BoolArray, settings: MagneticSettings) -> list[FoundTurn]:
     """Find turns of about constant bank in order of time.
 
-    Each has the reason where it is of no use.
+    A turn that is of no use has the reason.
     """
     roll = _smoothed(readings)
     together = np.concatenate([[0], np.cumsum(np.diff(readings.time_s) > BREAK_S)])

@@ -1,6 +1,6 @@
 """Prior art: iron from the constancy of the field's modulus, without any heading.
 
-It is nearly blind at small banks.
+The modulus is nearly blind at small banks.
 """
 
 import numpy as np
@@ -11,8 +11,7 @@ from groundstation.systems.magnetic.iron import Iron
 from groundstation.systems.magnetic.poisson import EarthField, IronFit
 from groundstation.systems.magnetic.settings import MagneticSettings
 
-PARAMETERS = 6
-NAMES = ("p", "q", "r", "a", "e", "b")
+PARAMETERS = 6  # p, q, r, a, e, b
 SOFT_PLACES = ((0, 0, 3), (1, 1, 4), (0, 1, 5), (1, 0, 5))  # row, column, parameter
 CONVERGED = 1e-7
 LARGEST = 0.45  # of the field: what is larger is no iron, and the soft iron stays invertible

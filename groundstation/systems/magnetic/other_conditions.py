@@ -12,22 +12,25 @@ from groundstation.base.angles import FloatArray, mean_heading, wrap_180
 from groundstation.base.declination import declination_along
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import BoolArray
+from groundstation.base.units import S_PER_H
 from groundstation.methods import harmonics
-from groundstation.systems.magnetic.answer import MethodName, OtherCondition, Vector
+from groundstation.systems.magnetic.answer import MethodName, OtherCondition, vector_of
 from groundstation.systems.magnetic.attitude import field_in_body, levelled_heading_deg
 from groundstation.systems.magnetic.compass_table import fit_to_circle
-from groundstation.systems.magnetic.iron import HEADINGS_DEG, Iron, derivatives, heading_errors
+from groundstation.systems.magnetic.held_out import stretch_numbers
+from groundstation.systems.magnetic.iron import HEADINGS_DEG, Iron, curve_rms, derivatives, heading_errors
 from groundstation.systems.magnetic.poisson import EarthField, IronFit
 from groundstation.systems.magnetic.readings import Readings
 from groundstation.tables.table import Flight
 
 AXES = ("forward", "right", "down")
-S_PER_H = 3600.0
-STRETCH_S, LONGEST_STEP_S, LEAST_STRETCHES = 20.0, 2.0, 2
+STRETCH_S, LEAST_STRETCHES = 20.0, 2
 PLACE_SIGMA_NT = 60.0  # of the field on the ground against that of the figure: height and place, beyond the model
 TELLING_SIGMAS = 2.0
 LEAST_SPAN_H = 0.05
-WANDER_S = 240.0  # twice a correlation time: over a longer flight the wander averages out
+# Twice a correlation time of the wander of roll and pitch: over a longer flight it averages out. 120 s is that of the
+# plain family (docs/magnetic-family.md); FIGURE_WANDER_S takes another time for the same wander.
+FLIGHT_WANDER_S = 240.0
 PITCH_STEP_DEG = 1.0
 
 
@@ -58,15 +61,10 @@ def other_conditions(
     return tuple(row for row in rows if row is not None)
 
 
-def _levelling_deg(earth: EarthField) -> float:
-    """Heading error on east and west by 1 deg of pitch in what levels the field: tan(dip)."""
-    return abs(earth.down_nt) / earth.horizontal_nt if earth.horizontal_nt > 0.0 else 0.0
-
-
 def _pitch_flown(flown: FlownConditions) -> tuple[float, str]:
     """Return the pitch farthest from the figure's that was flown level or stood at.
 
-    It also tells where pitch was, in words.
+    A text comes with it: where pitch was.
     """
     parts = {"in level flight": flown.is_level & ~flown.in_figure, "on the ground": ~flown.is_airborne}
     seen = {name: flown.readings.pitch_deg[rows] for name, rows in parts.items() if np.count_nonzero(rows) > 1}
@@ -90,8 +88,8 @@ def _pitch_without_iron(flown: FlownConditions, earth: EarthField) -> OtherCondi
 
 
 def _of_levelling(earth: EarthField) -> str:
-    size = _levelling_deg(earth)
-    return f"1 deg of pitch wrong in what levels the field is {size:.1f} deg on east and west (tan of dip)"
+    size_deg = earth.per_tilt
+    return f"1 deg of pitch wrong in what levels the field is {size_deg:.1f} deg on east and west (tan of dip)"
 
 
 def _pitch(flown: FlownConditions, fit: IronFit) -> OtherCondition:
@@ -110,13 +108,13 @@ def _pitch(flown: FlownConditions, fit: IronFit) -> OtherCondition:
     farthest, told = _pitch_flown(flown)
     most = float(np.max(np.abs(change(fit.iron, farthest))))
     text = f"pitch {told}: up to {most:.2f} deg at {_signed(farthest)} deg; {_of_levelling(fit.earth)}"
-    return OtherCondition("pitch", _rms(by_degree), sigma, float(np.max(np.abs(by_degree))), text)
+    return OtherCondition("pitch", curve_rms(by_degree), sigma, float(np.max(np.abs(by_degree))), text)
 
 
 def _on_ground(flight: Flight, flown: FlownConditions, fit: IronFit) -> OtherCondition | None:
     """Return what the readings on the ground have more than the figure's iron makes.
 
-    It is a steady vector in the body.
+    The difference is taken for a steady vector in the body.
     """
     rows = np.flatnonzero(~flown.is_airborne)
     left = flown.readings.take(rows)
@@ -135,7 +133,7 @@ def _on_ground(flight: Flight, flown: FlownConditions, fit: IronFit) -> OtherCon
         heading_errors(moved, horizontal, down, 0.0, flown.pitch_deg)
         - heading_errors(fit.iron, horizontal, down, 0.0, flown.pitch_deg)
     )
-    size, sigma = _rms(change), float(np.rad2deg(np.hypot(*sigma_nt[:2]) / horizontal / np.sqrt(2.0)))
+    size, sigma = curve_rms(change), float(np.rad2deg(np.hypot(*sigma_nt[:2]) / horizontal / np.sqrt(2.0)))
     told = ", ".join(f"{value:+.0f}" for value in added)
     is_seen = size > TELLING_SIGMAS * sigma
     text = f"on the ground the readings have {told} nT more than the iron of the figures makes ({_current(flown)})"
@@ -144,7 +142,7 @@ def _on_ground(flight: Flight, flown: FlownConditions, fit: IronFit) -> OtherCon
         if is_seen
         else ": not beyond chance"
     )
-    return OtherCondition("ground", size, sigma, float(np.max(np.abs(change))), text, _vector(added))
+    return OtherCondition("ground", size, sigma, float(np.max(np.abs(change))), text, vector_of(added))
 
 
 def _current(flown: FlownConditions) -> str:
@@ -176,20 +174,20 @@ def _gains(
     found = [_rate(hours, expected[:, axis], flying.field_nt[:, axis]) for axis in range(3)]
     rate, sigma_rate = (np.array(part) for part in zip(*found, strict=True))
     level_nt = np.sqrt(np.mean(expected[:, :2] ** 2)) * float(np.std(hours))
-    wander_nt = abs(fit.earth.down_nt) * np.deg2rad(wander_deg) / np.sqrt(max(span_h * S_PER_H / WANDER_S, 1.0))
+    wander_nt = abs(fit.earth.down_nt) * np.deg2rad(wander_deg) / np.sqrt(max(span_h * S_PER_H / FLIGHT_WANDER_S, 1.0))
     sigma_rate[:2] = np.hypot(sigma_rate[:2], wander_nt / max(level_nt, 1e-9))
     farthest_h = float(hours[np.argmax(np.abs(hours))])
     size = _of_gain(fit, flown.pitch_deg, rate * farthest_h, method)
-    each = [_rms(_of_gain(fit, flown.pitch_deg, step, method)) for step in np.diag(sigma_rate * farthest_h)]
+    each = [curve_rms(_of_gain(fit, flown.pitch_deg, step, method)) for step in np.diag(sigma_rate * farthest_h)]
     told = ", ".join(
         f"{axis} {value:+.2f} +- {sigma:.2f}"
         for axis, value, sigma in zip(AXES, 100.0 * rate, 100.0 * sigma_rate, strict=True)
     )
     sigma = float(np.hypot.reduce(each))
     text = f"gain, % per hour: {told}; size {abs(farthest_h) * 60.0:.0f} min from the figures"
-    is_seen = _rms(size) > TELLING_SIGMAS * sigma
+    is_seen = curve_rms(size) > TELLING_SIGMAS * sigma
     text += ", as of a sensor that warms or cools" if is_seen else ": not beyond chance"
-    return OtherCondition("gain", _rms(size), sigma, float(np.max(np.abs(size))), text)
+    return OtherCondition("gain", curve_rms(size), sigma, float(np.max(np.abs(size))), text)
 
 
 def _of_gain(fit: IronFit, pitch_deg: float, gain: FloatArray, method: MethodName) -> FloatArray:
@@ -272,18 +270,7 @@ def _along(
 
 def _means(time_s: FloatArray, values: FloatArray) -> FloatArray:
     """Means of values (n, c) over stretches of so many seconds without a gap, shape (m, c)."""
-    is_first = np.diff(time_s, prepend=-np.inf) > LONGEST_STEP_S
-    since_s = time_s - time_s[is_first][np.cumsum(is_first) - 1]
-    number = np.cumsum(is_first | (np.diff(since_s // STRETCH_S, prepend=0.0) > 0.0)) - 1
+    number = stretch_numbers(time_s, STRETCH_S)
     count = np.bincount(number)
     means = np.stack([np.bincount(number, column) / np.maximum(count, 1) for column in values.T], axis=1)
     return np.asarray(means[count >= 0.5 * np.median(count)])
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
-
-
-def _vector(values: FloatArray) -> Vector:
-    forward, right, down = values.tolist()
-    return forward, right, down

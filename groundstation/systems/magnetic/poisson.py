@@ -32,6 +32,14 @@ class EarthField:
     down_nt: float
     is_modelled: bool = True
 
+    @property
+    def per_tilt(self) -> float:
+        """Return the heading error per error of roll or pitch: Z / H, the tan of dip.
+
+        Roll turns the vertical field Z into the horizontal, angle x Z / H in C; pitch does in B.
+        """
+        return abs(self.down_nt) / self.horizontal_nt if self.horizontal_nt > 0.0 else 0.0
+
 
 @dataclass(frozen=True)
 class DipShift:
@@ -112,9 +120,24 @@ class _Solved:
 class _Field:
     """Knowledge of the field after the readings, relative to one solution.
 
-    ``down_nt``: what they show more of Z at the H of the solution, with its variance; ``shift_nt``, of H and Z, what is
-    believed of it; ``gain`` of it the share believed. ``prior_variance`` of Z at a given H, ``per_strength`` the
-    relative strength that goes with it, ``strength_variance`` the rest of that.
+    Parameters
+    ----------
+    moved : ndarray, shape (n,)
+        What each reading does to Z at a given H.
+    down_nt : float
+        Z that the readings show more than the model at the H of the solution.
+    variance, wander_variance : float
+        Variance of ``down_nt``; the part of it by roll that wanders.
+    gain : float
+        Share of ``down_nt`` that is believed.
+    shift_nt : (float, float)
+        Change of H and Z that is believed.
+    prior_variance : float
+        Variance of Z at a given H, as the model has it.
+    per_strength : float
+        Relative strength of the field that goes with 1 nT of Z at a given H.
+    strength_variance : float
+        Variance of the relative strength beyond that.
     """
 
     moved: FloatArray
@@ -142,26 +165,28 @@ def fit_iron(readings: Readings, earth: EarthField, settings: MagneticSettings) 
     An error of the reference heading turns the field about the vertical, not about the body's axis: at bank it goes
     into the soft iron, E above all, so that the fit is repeated with the heading 1 deg off.
     """
-    model = _with_dip(readings, earth, settings)
-    more = _solved(readings, _raised(model.earth, 0.0, DOWN_STEP_NT), settings)
-    per_down = (more.iron.vector() - model.iron.vector()) / DOWN_STEP_NT
-    seen = (more.residual_nt - model.residual_nt) / DOWN_STEP_NT
-    solved = _solved(readings, _raised(model.earth, 0.0, float(np.sum(_moved(model, seen)))), settings)
-    field = _field(readings, model.earth, solved, seen, settings)
-    found = _solved(readings, _raised(model.earth, *field.shift_nt), settings)
+    by_model = _with_dip(readings, earth, settings)
+    raised = _solved(readings, _raised(by_model.earth, 0.0, DOWN_STEP_NT), settings)
+    iron_per_down = (raised.iron.vector() - by_model.iron.vector()) / DOWN_STEP_NT
+    residual_per_down = (raised.residual_nt - by_model.residual_nt) / DOWN_STEP_NT
+    seen_down_nt = float(np.sum(_moved(by_model, residual_per_down)))
+    by_readings = _solved(readings, _raised(by_model.earth, 0.0, seen_down_nt), settings)
+    field = _field(readings, by_model.earth, by_readings, residual_per_down, settings)
+    found = _solved(readings, _raised(by_model.earth, *field.shift_nt), settings)
     turned = replace(found.earth, declination_deg=found.earth.declination_deg - 1.0)
-    left = (1.0 - field.gain) ** 2 * field.prior_variance + field.gain**2 * field.wander_variance
-    influence = solved.influence + field.gain * np.outer(field.moved, per_down)
+    down_variance = (1.0 - field.gain) ** 2 * field.prior_variance + field.gain**2 * field.wander_variance
+    influence = by_readings.influence + field.gain * np.outer(field.moved, iron_per_down)
+    dip_shift = DipShift(field.down_nt, float(np.sqrt(field.prior_variance + field.variance)))
     return IronFit(
-        found.iron,
-        solved.variance(influence) + left * np.outer(per_down, per_down),
-        found.earth,
-        found.condition_number,
-        found.residual_nt,
-        _solved(readings, turned, settings).iron.vector() - found.iron.vector(),
-        _objection(found.iron, found.condition_number, settings),
-        _strength_covariance(found.iron, per_down, field) if earth.is_modelled else None,
-        DipShift(field.down_nt, float(np.sqrt(field.prior_variance + field.variance))) if earth.is_modelled else None,
+        iron=found.iron,
+        covariance=by_readings.variance(influence) + down_variance * np.outer(iron_per_down, iron_per_down),
+        earth=found.earth,
+        condition_number=found.condition_number,
+        residual_nt=found.residual_nt,
+        per_azimuth_deg=_solved(readings, turned, settings).iron.vector() - found.iron.vector(),
+        reason=_objection(found.iron, found.condition_number, settings),
+        strength_covariance=_strength_covariance(found.iron, iron_per_down, field) if earth.is_modelled else None,
+        dip_shift=dip_shift if earth.is_modelled else None,
     )
 
 
@@ -201,22 +226,22 @@ def _field(
     gain = prior / (prior + variance)
     relative = per_strength * gain * down
     return _Field(
-        moved,
-        down,
-        variance,
-        float(wander),
-        gain,
-        (earth.horizontal_nt * relative, gain * down + earth.down_nt * relative),
-        prior,
-        per_strength,
-        strength - per_strength**2 * prior,
+        moved=moved,
+        down_nt=down,
+        variance=variance,
+        wander_variance=float(wander),
+        gain=gain,
+        shift_nt=(earth.horizontal_nt * relative, gain * down + earth.down_nt * relative),
+        prior_variance=prior,
+        per_strength=per_strength,
+        strength_variance=strength - per_strength**2 * prior,
     )
 
 
 def _strength_covariance(iron: Iron, per_down: FloatArray, field: _Field) -> FloatArray:
     """Return what the error of the strength adds to the covariance of the iron.
 
-    It does so through Z at a given H and by itself.
+    The strength adds through Z at a given H and by itself.
     """
     per_strength = np.zeros(len(per_down))
     per_strength[: AXES * AXES] = -iron.soft.ravel()
@@ -283,7 +308,7 @@ def _solved(readings: Readings, earth: EarthField, settings: MagneticSettings) -
 def _influence(scaled: FloatArray, scale: FloatArray, residual: FloatArray, weight: FloatArray) -> FloatArray:
     """Return what each reading does to the parameters, shape (n, k).
 
-    They are in the order of :meth:`Iron.vector`.
+    Parameters are in the order of :meth:`Iron.vector`.
     """
     bread = np.linalg.pinv(scaled.T @ (scaled * weight[:, None]))
     of_unit = (scaled * weight[:, None]) @ bread / scale
@@ -294,7 +319,7 @@ def _influence(scaled: FloatArray, scale: FloatArray, residual: FloatArray, weig
 def _columns(readings: Readings, earth: EarthField, settings: MagneticSettings) -> tuple[FloatArray, float]:
     """Return what multiplies the parameters of an axis.
 
-    It is the field along the body, 1, and the current where it varies.
+    Columns are the field along the body, 1, and the current where it varies.
     """
     heading = wrap_180(readings.true_heading_deg - earth.declination_deg)
     field = field_in_body(earth.horizontal_nt, earth.down_nt, heading, readings.roll_deg, readings.pitch_deg)

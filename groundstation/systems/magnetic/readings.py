@@ -103,7 +103,7 @@ def gather(
 ) -> tuple[Readings, float]:
     """Return readings at the times of the magnetometer, and its latency.
 
-    They are put back by the latency where that is observed.
+    The times are put back by the latency where that is observed.
 
     Raises
     ------

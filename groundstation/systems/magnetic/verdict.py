@@ -1,6 +1,6 @@
 """Gates and verdict of the magnetic deviation."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from groundstation.results.gates import Bound, Gate, GateState, judged_gate
 from groundstation.results.rules import Rejudged
@@ -19,34 +19,40 @@ from groundstation.systems.magnetic.answer import (
 from groundstation.systems.magnetic.settings import MagneticSettings
 
 
-def build_gates(
-    turns: list[Turn],
-    swings: list[Swing],
-    coverage: Coverage,
-    alignment: Alignment,
-    residual: Residual | None,
-    bias: BankBias | None,
-    method: MethodName,
-    dip_sigmas: float | None,
-    settings: MagneticSettings,
-) -> tuple[Gate, ...]:
-    """Build every gate with its figure.
+@dataclass(frozen=True, kw_only=True)
+class JudgedValues:
+    """Parts of an answer that its gates judge.
 
-    ``turns`` are those used, ``bias`` is that of the bank flown. ``dip_sigmas``: by how many sigma the vertical field
-    of the readings differs from the model's.
+    ``turns`` are those used, ``bank_bias`` is that of the bank flown. ``dip_sigmas``: by how many sigma the vertical
+    field of the readings differs from the model's.
     """
-    altitude = min((turn.altitude_m for turn in turns if turn.altitude_m is not None), default=None)
-    unequal = max(abs(abs(swing.right_bank_deg) - abs(swing.left_bank_deg)) for swing in swings)
-    repeat = max((swing.difference_rms_deg for swing in swings if swing.difference_rms_deg is not None), default=None)
-    unsteady = max(turn.bank_sd_deg for turn in turns)
-    after = residual.after if residual else None
-    contradicted = against_heading(alignment)
+
+    turns: list[Turn]
+    swings: list[Swing]
+    coverage: Coverage
+    alignment: Alignment
+    residual: Residual | None
+    bank_bias: BankBias | None
+    method: MethodName
+    dip_sigmas: float | None
+
+
+def build_gates(judged: JudgedValues, settings: MagneticSettings) -> tuple[Gate, ...]:
+    """Build every gate with its figure."""
     bounds = gate_bounds(settings)
+    return (*_gates_of_the_figure(judged, bounds), *_gates_of_the_result(judged, bounds), *_informing(judged, bounds))
+
+
+def _gates_of_the_figure(judged: JudgedValues, bounds: dict[str, Bound]) -> tuple[Gate, ...]:
+    """Build the gates on how the figure was flown, and on the heading it rests on."""
+    unequal = max(abs(abs(swing.right_bank_deg) - abs(swing.left_bank_deg)) for swing in judged.swings)
+    unsteady = max(turn.bank_sd_deg for turn in judged.turns)
+    contradicted = against_heading(judged.alignment)
     return (
-        _gate(bounds, "coverage", "circle covered by both branches", coverage.share),
+        _gate(bounds, "coverage", "circle covered by both branches", judged.coverage.share),
         _gate(bounds, "bank_difference", "difference of opposite banks", unequal, "deg"),
         _gate(bounds, "bank_steadiness", "standard deviation of bank in a turn", unsteady, "deg"),
-        _gate(bounds, "alignment", "sigma of the INS heading at the figure", alignment.sigma_deg, "deg"),
+        _gate(bounds, "alignment", "sigma of the INS heading at the figure", judged.alignment.sigma_deg, "deg"),
         _gate(
             bounds,
             "heading",
@@ -55,11 +61,17 @@ def build_gates(
             is_required=contradicted is not None,
             reason="no heading analysis of this INS",
         ),
+    )
+
+
+def _gates_of_the_result(judged: JudgedValues, bounds: dict[str, Bound]) -> tuple[Gate, ...]:
+    """Build the gates on what the correction leaves, and on the field it rests on."""
+    return (
         _gate(
             bounds,
             "held_out",
             "rms error after correction in flight that no fit used",
-            after,
+            judged.residual.after if judged.residual else None,
             "deg",
             reason="no level flight beside the figure",
         ),
@@ -67,24 +79,32 @@ def build_gates(
             bounds,
             "bank_bias",
             "rms of the forecast bank bias of the average of branches",
-            bias.rms_deg if bias else None,
+            judged.bank_bias.rms_deg if judged.bank_bias else None,
             "deg",
-            is_required=method == "compass_table",
+            is_required=judged.method == "compass_table",
             reason="no iron fitted to forecast it from",
         ),
         _gate(
             bounds,
             "dip",
             "dip of the field, readings against model, in sigmas",
-            dip_sigmas,
-            is_required=dip_sigmas is not None,
+            judged.dip_sigmas,
+            is_required=judged.dip_sigmas is not None,
             reason="no model of the field, or no iron fitted",
         ),
+    )
+
+
+def _informing(judged: JudgedValues, bounds: dict[str, Bound]) -> tuple[Gate, ...]:
+    """Build the gates on height, which informs, and on repetition, where figures are repeated."""
+    altitudes = [turn.altitude_m for turn in judged.turns if turn.altitude_m is not None]
+    repeats = [swing.difference_rms_deg for swing in judged.swings if swing.difference_rms_deg is not None]
+    return (
         _gate(
             bounds,
             "altitude",
             "lowest mean altitude of a turn",
-            altitude,
+            min(altitudes, default=None),
             "m",
             is_required=False,
             reason="no altitude in the log",
@@ -93,9 +113,9 @@ def build_gates(
             bounds,
             "repeatability",
             "rms difference of repeated figures",
-            repeat,
+            max(repeats, default=None),
             "deg",
-            is_required=len(swings) > 1,
+            is_required=len(judged.swings) > 1,
             reason="one figure alone",
         ),
     )

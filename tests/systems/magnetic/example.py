@@ -150,7 +150,7 @@ def table(topic: str, time_ns: np.ndarray, columns: dict[str, np.ndarray]) -> Ta
 
 
 def taxi_heading(**changes: Any) -> HeadingResult:
-    """System 1's answer as if taxi had found nothing wrong, 0.1 deg sigma, at the start of the flight."""
+    """Answer of the heading analysis as if taxi had found nothing wrong, 0.1 deg sigma, at the start of the flight."""
     answer = HeadingResult(
         *("ins", "gnss", "true heading", "accept", "", 0.0, 0.1, (-0.2, 0.2), 0.0, 0.1, 0.1, 0.1),
         *(100, 60.0, None, None, 0.0, 0.01, (), None, ()),

@@ -92,7 +92,7 @@ def runs_of(
 
 
 def aligned(flight: Flight, settings: MagneticSettings | None = None) -> Alignment:
-    """As a run does it: system 1 first, then the run to lift-off."""
+    """As a run does it: the heading analysis first, then the run to lift-off."""
     settings, heading = settings or MagneticSettings(), estimate_heading_error(flight)
     return align(heading, "ins", flight.duration_s, settings, runs_of(flight, settings, heading))
 

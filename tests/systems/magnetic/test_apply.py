@@ -64,7 +64,7 @@ from tests.recording_contents import Contents
 from tests.reports.test_reports import HOSTILE
 from tests.saved import load
 from tests.systems.magnetic import example as magnetic_example
-from tests.systems.magnetic.test_run import analysed, figure_eight, simulated, system_3_alone
+from tests.systems.magnetic.test_run import analysed, figure_eight, magnetic_alone, simulated
 from tests.told import write_recording
 
 FAMILY = MagneticFamilySettings(
@@ -86,8 +86,8 @@ OWNER = {"method": "compass_table", "verdict": "accept", "flight_id": "F1", "air
 
 @pytest.fixture(scope="module", autouse=True)
 def short_runs() -> Iterator[None]:
-    """Runs of system 3 alone, a fifth of the work: no test here looks at more."""
-    with system_3_alone():
+    """Runs of the magnetic analysis alone, a fifth of the work: no test here looks at more."""
+    with magnetic_alone():
         yield
 
 

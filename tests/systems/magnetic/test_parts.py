@@ -16,11 +16,11 @@ from groundstation.systems.magnetic.compass_table import CENTRES_DEG, build_tabl
 from groundstation.systems.magnetic.held_out import Unseen, advantage
 from groundstation.systems.magnetic.iron import Iron, bank_bias, heading_errors, parameters_of
 from groundstation.systems.magnetic.manoeuvre import covered_bins, widest_gap_deg
-from groundstation.systems.magnetic.methods import recommend
 from groundstation.systems.magnetic.modulus import fit_modulus
 from groundstation.systems.magnetic.poisson import EarthField
 from groundstation.systems.magnetic.readings import Readings
 from groundstation.systems.magnetic.settings import MagneticSettings
+from groundstation.systems.magnetic.three_methods import recommend
 from tests.systems.magnetic.example import correlated, taxi_heading
 
 EARTH = EarthField(11.0, 17_000.0, 50_000.0)

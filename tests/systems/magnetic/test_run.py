@@ -1,4 +1,4 @@
-"""System 3 in a whole run: verdict and coefficients beside the truth, reasons where there is no answer, files."""
+"""Magnetic deviation in a whole run: verdict and coefficients beside the truth, reasons where there is none, files."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -48,8 +48,8 @@ def simulated(name: str) -> Simulated:
 
 
 @contextmanager
-def system_3_alone() -> Iterator[pytest.MonkeyPatch]:
-    """Within, runs have system 3 and what it builds on: the other analyses take longer, and no test of it asks them."""
+def magnetic_alone() -> Iterator[pytest.MonkeyPatch]:
+    """Within, runs have the magnetic analysis and what it builds on: the others take longer, and no test asks them."""
     with pytest.MonkeyPatch.context() as patch:
         asked = tuple(one for one in systems().analyses if one.name in ("latency", "heading", "magnetic"))
         patch.setattr(pipeline, "systems", lambda: shipped_but(analyses=asked))
@@ -59,7 +59,7 @@ def system_3_alone() -> Iterator[pytest.MonkeyPatch]:
 def analysed(flight: Flight, configuration: Configuration | None = None) -> FlightResults:
     source = Source("flight.csv", "ab" * 32, 1, "flat-csv")
     given = Given("NOTIME_abababab", source, Ledger(), Clock(), (), has_lost_data=False)
-    with system_3_alone():
+    with magnetic_alone():
         return analyse(flight, given, configuration or Configuration())
 
 

@@ -1,6 +1,6 @@
 """Answer of landing by locators: deviations from course and glide path.
 
-They come from relative bearings and radio altitude.
+The deviations come from relative bearings and radio altitude.
 """
 
 from dataclasses import dataclass, field

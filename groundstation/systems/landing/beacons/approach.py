@@ -149,7 +149,8 @@ def unknown_rise_m(sampled: Sampled, told: "PlaceEvidence", runway: Runway) -> F
 def over_known_ground(found: Deviations, rise_m: FloatArray, most_m: float) -> Deviations:
     """Drop the glide path deviations over ground that rises or falls by more than ``most_m``.
 
-    Those whose rise is unknown, beyond the ends of the profile, go too, where an altitude tells the rise of the rest.
+    Deviations over ground whose rise is unknown, beyond the ends of the profile, go too, where an altitude tells the
+    rise of the rest.
 
     """
     is_kept = (np.abs(rise_m) <= most_m) | ~np.isfinite(rise_m).any()
@@ -173,7 +174,7 @@ class PlaceEvidence:
 def belief(sampled: Sampled, found: Deviations, runway: Runway) -> PlaceEvidence:
     """Return the speed at which the distance shrinks, and what else speaks for the places.
 
-    That is the heading against the INS, and the ground under the approach.
+    The heading speaks by that of the INS, and the ground under the approach.
     """
     good = found.found & (found.distance_sigma_m < WELL_KNOWN_M)
     speed = threshold_s = float("nan")

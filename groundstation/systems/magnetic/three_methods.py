@@ -12,11 +12,11 @@ from groundstation.systems.magnetic.answer import Method, MethodName
 from groundstation.systems.magnetic.compass_table import CompassTable, fit_to_circle
 from groundstation.systems.magnetic.held_out import (
     LONGEST_STEP_S,
-    Left,
+    Remaining,
     Unseen,
-    left_by_iron,
-    left_by_nothing,
-    left_by_table,
+    remaining_by_iron,
+    remaining_by_table,
+    remaining_uncorrected,
     seen_wander,
 )
 from groundstation.systems.magnetic.iron import Iron, bank_bias, derivatives, level_coefficients
@@ -31,7 +31,9 @@ NO_CIRCULAR = (
 )
 WANDER_IN_A_TO_E = np.array([0.3, 1.0, 1.0, 0.3, 0.3])  # what wanders with the turn rate goes into A, D, E
 WANDER_FREEDOM = 4.0  # what the settings say of the wander counts as so many stretches
-WANDER_S = 500.0  # twice a correlation time: in a figure that lasts longer the wander averages out as its inverse
+# Twice a correlation time of the wander of roll and pitch: over a longer figure it averages out as the inverse. 250 s
+# lies between the 120 and the 400 s of docs/magnetic-family.md; FLIGHT_WANDER_S takes another time for the same wander.
+FIGURE_WANDER_S = 500.0
 TELLING_SIGMAS = 2.0  # held-out errors that differ by less may do so by chance
 FORECAST_BANKS_DEG = (10.0, 20.0, 30.0)
 
@@ -75,31 +77,23 @@ def fit_all(
             modulus = replace(modulus, reason=f"{reason}: condition number {modulus.condition_number:.3g}")
     bias = np.zeros(360) if attitude.reason else bank_bias(attitude.iron, *_strengths(found), bank, pitch)
     seconds = float(np.sum(np.minimum(np.diff(figure.time_s), LONGEST_STEP_S)))
-    wander_deg = _wander_deg(attitude, unseen, settings) * math.sqrt(min(1.0, WANDER_S / max(seconds, 1.0)))
-    wander = np.diag((wander_deg * _per_attitude(found) * WANDER_IN_A_TO_E) ** 2)
+    wander_deg = _wander_deg(attitude, unseen, settings) * math.sqrt(min(1.0, FIGURE_WANDER_S / max(seconds, 1.0)))
+    wander = np.diag((wander_deg * found.per_tilt * WANDER_IN_A_TO_E) ** 2)
     return Fits(table, bias, attitude, modulus, pitch, bank, wander_deg, wander)
-
-
-def _per_attitude(earth: EarthField) -> float:
-    """Return how much heading error a small error of roll makes: Z / H.
-
-    Roll turns the vertical field Z into the horizontal, angle x Z / H in C; pitch does in B.
-    """
-    return abs(earth.down_nt) / earth.horizontal_nt if earth.horizontal_nt > 0.0 else 0.0
 
 
 def _wander_deg(fit: IronFit, unseen: Unseen | None, settings: MagneticSettings) -> float:
     """Return the wander of roll and pitch over minutes.
 
-    It is weighed from the settings' and from what level flight beside the figure shows.
+    The wander is weighed from that of the settings and from what level flight beside the figure shows.
 
     Source: Gelman et al., Bayesian Data Analysis, 3rd ed. 2013, section 2.6 (scaled inverse chi-square).
     """
-    per_attitude, known = _per_attitude(fit.earth), settings.attitude_wander_deg
-    if fit.reason or unseen is None or per_attitude <= 0.0:
+    per_tilt, known = fit.earth.per_tilt, settings.attitude_wander_deg
+    if fit.reason or unseen is None or per_tilt <= 0.0:
         return known
     spread_deg, freedom = seen_wander(unseen, fit)
-    seen_deg = spread_deg / per_attitude
+    seen_deg = spread_deg / per_tilt
     return math.sqrt((WANDER_FREEDOM * known**2 + freedom * seen_deg**2) / (WANDER_FREEDOM + freedom))
 
 
@@ -120,8 +114,8 @@ def method_rows(
     bias, bias_covariance = bias_coefficients(fits, a_sigma_deg)
     covariance = table.covariance + np.diag(bias**2) + bias_covariance + fits.wander
     covariance[0, 0] += a_sigma_deg**2
-    before = left_by_nothing(unseen).rms_deg if unseen else None
-    after = left_by_table(unseen, table, deviation_deg, fits.bias_deg) if unseen else None
+    before = remaining_uncorrected(unseen).rms_deg if unseen else None
+    after = remaining_by_table(unseen, table, deviation_deg, fits.bias_deg) if unseen else None
     by_table = Method("compass_table", "fitted", "", table.samples, 720, held_out_before_deg=before)
     return (
         _with(by_table, after, values, covariance),
@@ -133,8 +127,8 @@ def method_rows(
 def bias_coefficients(fits: Fits, azimuth_sigma_deg: float) -> tuple[FloatArray, FloatArray]:
     """Return A to E of the forecast bank bias, shape (5,), and their covariance.
 
-    They tell how far the table's may be from level flight. The covariance is that of the iron, with the error of the
-    reference heading.
+    The coefficients tell how far the table's may be from level flight. The covariance is that of the iron, with the
+    error of the reference heading.
     """
     fit = fits.forecast
     if fit is None:
@@ -199,7 +193,7 @@ def _by_iron(
     values, covariance = level_coefficients(fit.iron, spread, *_strengths(fit.earth), fits.pitch_deg)
     if not is_modulus:
         covariance = covariance + fits.wander
-    row = _with(row, left_by_iron(unseen, fit, a_sigma_deg) if unseen else None, values, covariance)
+    row = _with(row, remaining_by_iron(unseen, fit, a_sigma_deg) if unseen else None, values, covariance)
     if not is_modulus:
         return row
     seen = {letter: value for letter, value in row.coefficients_deg.items() if letter != "A"}
@@ -207,20 +201,20 @@ def _by_iron(
     return replace(row, coefficients_deg=seen, coefficients_sigma_deg=sigma)
 
 
-def _with(row: Method, left: Left | None, values: FloatArray, covariance: FloatArray) -> Method:
+def _with(row: Method, remaining: Remaining | None, values: FloatArray, covariance: FloatArray) -> Method:
     variance = np.diag(covariance)
     row = replace(
         row,
         coefficients_deg=dict(zip(LETTERS, map(float, values), strict=True)),
         coefficients_sigma_deg=dict(zip(LETTERS, map(float, np.sqrt(variance)), strict=True)),
     )
-    if left is None:
+    if remaining is None:
         return row
     return replace(
         row,
-        held_out_after_deg=left.rms_deg,
-        held_out_mean_deg=left.mean_deg,
-        held_out_mean_sigma_deg=left.mean_sigma_deg,
+        held_out_after_deg=remaining.rms_deg,
+        held_out_mean_deg=remaining.mean_deg,
+        held_out_mean_sigma_deg=remaining.mean_sigma_deg,
     )
 
 
