@@ -8,6 +8,7 @@ from groundstation.chapters.wording import clean, percent
 from groundstation.results.arrays.flight import Overview, PhaseSpans, StateLanes
 from groundstation.results.flight import KIND_OF_VEHICLE, PHASES_BY, WHY_THAT_VEHICLE, FlightResults
 
+NOTHING_PROVEN = "none: "  # what the method of phases begins with where nothing proves one
 LEAST_SHARE = 0.005  # of the time: less is not told
 
 FIGURES = (
@@ -32,5 +33,7 @@ def _vehicle(results: FlightResults) -> str:
     share = 0.0 if phases is None else phases.likely_share()
     if share < LEAST_SHARE:
         return told
-    by = clean(results.metadata.get(PHASES_BY, "").removeprefix("none: "))
-    return f"{told} Phases of {percent(share)} of the time are likely by speed and height, not proven: {by}."
+    method = clean(results.metadata.get(PHASES_BY, ""))
+    why_not = method.removeprefix(NOTHING_PROVEN)
+    rest = f"nothing proves them: {why_not}" if why_not != method else f"the others are proven ({method})"
+    return f"{told} Phases of {percent(share)} of the time are likely by speed and height; {rest}."
