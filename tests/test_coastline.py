@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from groundstation.base.angles import wrap_180
-from groundstation.base.coastline import ERROR_M, FILE, LONGEST_DEG, NAME, coastline_near
+from groundstation.base.coastline import COARSE_M, ERROR_M, FILE, LONGEST_DEG, NAME, coastline_near
 from groundstation.base.geodesy import POLAR_LATITUDE_DEG, latitude_longitude_deg, plan_north_east_m
 from groundstation.chapters.plots import coast
 from groundstation.chapters.plots.flight import track_map
@@ -23,6 +23,7 @@ from groundstation.results.flight import FlightResults
 from tests.report_example import example
 
 MOST_BYTES = 300_000
+MOST_DRAWN = 300  # rings: fewer than a painter draws
 # Capes and shores whose places are known from charts, to a minute of arc or better.
 KNOWN_DEG = {
     "Cabo Finisterre": (42.882, -9.272),
@@ -101,6 +102,19 @@ def test_nothing_near_is_missing_and_lines_do_not_leap() -> None:
         assert not missing
 
 
+def test_line_of_a_continent_stays_near_the_other() -> None:
+    place = (47.0, -2.0)
+    fine, coarse = (
+        np.column_stack(plan_north_east_m(*coastline_near(*place, 300_000.0, step_m), *place, is_polar=False))
+        for step_m in (0.0, COARSE_M)
+    )
+    coarse = coarse[np.hypot(*coarse.T) < 250_000.0]
+    fine = fine[np.isfinite(fine).all(axis=1)]
+    apart = np.hypot(coarse[:, None, 0] - fine[:, 0], coarse[:, None, 1] - fine[:, 1]).min(axis=1)
+    assert len(coarse) > 10 and apart.max() < 1.0, "its places are some of the other's"
+    assert len(coastline_near(*place, 30_000_000.0, COARSE_M)[0]) < 40_000
+
+
 def test_map_at_a_shore_has_it_beneath_the_track_and_says_so() -> None:
     plot = drawn(around(NICE))
     shore = shore_of(plot)
@@ -157,6 +171,8 @@ def test_date_line_is_crossed_as_if_it_were_not_there(beyond_deg: float) -> None
     known, across = coastline_near(*place, 100_000.0)
     apart = np.hypot(known[:, None] - latitude, wrap_180(across[:, None] - longitude))
     assert np.nanmax(np.nanmin(apart, axis=0)) < 0.001
+    is_there = np.abs(wrap_180(across - 180.0)) < 0.003
+    assert not (is_there[1:] & is_there[:-1]).any(), "land is not cut along the date line"
 
 
 def test_near_a_pole_the_coast_has_the_distance_and_direction_of_the_track() -> None:
@@ -182,7 +198,7 @@ def test_a_continent_is_drawn_with_a_bounded_number_of_places() -> None:
     plot = drawn(straight((40.0, -75.0), (50.0, 10.0)))
     shore = shore_of(plot)
     assert shore is not None
-    assert sum(map(len, shore.rings)) <= coast.MOST_PLACES and len(shore.rings) <= coast.MOST_RINGS
+    assert sum(map(len, shore.rings)) <= coast.MOST_PLACES and len(shore.rings) < MOST_DRAWN
     assert max(map(len, shore.rings)) <= coast.MOST_OF_A_RING
     assert len(picture_of(plot)) < 120_000
 

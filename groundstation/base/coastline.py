@@ -1,10 +1,11 @@
-"""Coastline of the Earth, without a network: Natural Earth 1:10m, simplified.
+"""Coastline of the Earth: Natural Earth 1:10m, simplified, public domain.
 
 ``benchmarks/make_coastline.py`` makes ``coastline.npz`` and measures its error against GSHHG 2.3.6: of the line's
 length half is within 0.5 km of the shore, 90 % within 1.8 km. Of the shores 90 % have the line within 3.3 km: islands
 below 2 km2 and narrow bays are not in it, nor are lakes.
 """
 
+from dataclasses import dataclass
 from functools import cache
 from math import asin, cos, degrees, radians, sin
 from pathlib import Path
@@ -15,37 +16,55 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.base.geodesy import SEMI_MAJOR_M
+from groundstation.base.records import BoolArray
 
 FILE = Path(__file__).with_name("coastline.npz")
 NAME = "Natural Earth 1:10m"
 ERROR_M = 2000.0  # 90 % of its length lie within
 LONGEST_DEG = 0.51  # of latitude or longitude between two places of a line
+COARSE_M = 8000.0  # as far the coarse line lies from the other
 HALF_TURN_DEG = 180.0
 Whole: TypeAlias = NDArray[np.int32]
 
 
+@dataclass(frozen=True)
+class _Kept:
+    """Places in whole units, shape (2, n), longitude first, and where lines begin.
+
+    Those of maps of a continent are apart.
+    """
+
+    places: Whole
+    starts: BoolArray
+    coarse_places: Whole
+    coarse_starts: BoolArray
+    unit_deg: float
+
+
 @cache
-def _kept() -> tuple[Whole, NDArray[np.bool_], float]:
-    """Return all places in whole units, shape (2, n), where lines begin, and the unit."""
+def _kept() -> _Kept:
     with np.load(FILE, allow_pickle=False) as kept:
-        steps, starts, counts, unit_deg = (kept[name] for name in ("steps", "starts", "counts", "unit_deg"))
-    behind = np.cumsum(counts + 1)
-    first = np.append(0, behind[:-1])
-    begins = np.zeros(behind[-1], dtype=bool)
-    begins[first] = True
-    places = np.empty((2, len(begins)), dtype=np.int32)
-    places[:, ~begins] = steps
-    ends = starts + np.add.reduceat(steps, np.append(0, np.cumsum(counts)[:-1]), axis=1, dtype=np.int32)
-    places[:, first] = starts
-    places[:, first[1:]] -= ends[:, :-1]
-    return np.cumsum(places, axis=1, dtype=np.int32), begins, float(unit_deg)
+        steps, begins, counts, unit_deg = (kept[name] for name in ("steps", "starts", "counts", "unit_deg"))
+        coarse = np.unpackbits(kept["coarse"], count=steps.shape[1] + len(counts)).view(np.bool_)
+    first = np.append(0, np.cumsum(counts + 1)[:-1])
+    starts = np.zeros(len(coarse), dtype=bool)
+    starts[first] = True
+    moves = np.empty((2, len(coarse)), dtype=np.int32)
+    moves[:, ~starts] = steps
+    moves[:, first] = begins
+    ends = begins + np.add.reduceat(steps, np.append(0, np.cumsum(counts)[:-1]), axis=1, dtype=np.int32)
+    moves[:, first[1:]] -= ends[:, :-1]
+    places = np.cumsum(moves, axis=1, dtype=np.int32)
+    return _Kept(places, starts, places[:, coarse], starts[coarse], float(unit_deg))
 
 
-def coastline_near(latitude_deg: float, longitude_deg: float, distance_m: float) -> tuple[FloatArray, FloatArray]:
+def coastline_near(
+    latitude_deg: float, longitude_deg: float, distance_m: float, step_m: float = 0.0
+) -> tuple[FloatArray, FloatArray]:
     """Return latitudes and longitudes of the coastline around a place, NaN between its lines.
 
-    All of it within the distance is there, and some beyond. Longitudes are within half a turn of the place's; a line is
-    broken where it passes the meridian opposite.
+    All of it within the distance is there, and some beyond; where steps of 8 km cannot be seen, as lines within 8 km of
+    it. Longitudes are within half a turn of the place's; a line is broken where it passes the meridian opposite.
 
     Examples
     --------
@@ -53,18 +72,28 @@ def coastline_near(latitude_deg: float, longitude_deg: float, distance_m: float)
     >>> bool(np.nanmin(latitude) > -34.9), coastline_near(50.0, 80.0, 5_000.0)[0].size
     (True, 0)
     """
-    places, begins, unit_deg = _kept()
-    half_deg = min(degrees(distance_m / SEMI_MAJOR_M) * 1.01, HALF_TURN_DEG)
-    latitude = unit_deg * places[1]
-    near = np.flatnonzero(np.abs(latitude - latitude_deg) <= half_deg + LONGEST_DEG)
-    east = wrap_180(unit_deg * places[0, near] - longitude_deg)
-    inside = np.abs(east) <= _half_width_deg(latitude_deg, half_deg) + LONGEST_DEG
-    rows, east = near[inside], east[inside]
-    if not rows.size:
-        return np.zeros(0), np.zeros(0)
-    breaks = begins[rows[1:]] | (np.diff(rows) > 1) | (np.abs(np.diff(east)) > HALF_TURN_DEG)
-    after = np.flatnonzero(breaks) + 1
-    return np.insert(latitude[rows], after, np.nan), np.insert(longitude_deg + east, after, np.nan)
+    kept = _kept()
+    places, starts, longest_deg = kept.places, kept.starts, LONGEST_DEG
+    if step_m >= COARSE_M:
+        places, starts, longest_deg = kept.coarse_places, kept.coarse_starts, HALF_TURN_DEG
+    half_deg = min(degrees(distance_m / SEMI_MAJOR_M) * 1.01 + longest_deg, HALF_TURN_DEG)
+    above = places[1] - round(latitude_deg / kept.unit_deg)
+    places, starts = _of_rows(places, starts, np.abs(above) <= round(half_deg / kept.unit_deg))
+    east = wrap_180(kept.unit_deg * places[0] - longitude_deg)
+    near = np.abs(east) <= _half_width_deg(latitude_deg, half_deg)
+    places, starts = _of_rows(places, starts, near)
+    east = east[near]
+    starts[1:] |= np.abs(np.diff(east)) > HALF_TURN_DEG
+    after = np.flatnonzero(starts[1:]) + 1
+    return np.insert(kept.unit_deg * places[1], after, np.nan), np.insert(longitude_deg + east, after, np.nan)
+
+
+def _of_rows(places: Whole, starts: BoolArray, keep: BoolArray) -> tuple[Whole, BoolArray]:
+    """Return some of the places; a line begins behind each that is left out."""
+    rows = np.flatnonzero(keep)
+    begins = starts[rows]
+    begins[1:] |= np.diff(rows) > 1
+    return places[:, rows], begins
 
 
 def _half_width_deg(latitude_deg: float, half_deg: float) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 
 from groundstation.base.ellipse import ELLIPSE_95, outlines
 from groundstation.base.geodesy import is_near_pole, on_earth, plan_north_east_m
-from groundstation.chapters.plots import coast
+from groundstation.chapters.plots.coast import coast
 from groundstation.chapters.plots.common import lane_roles, span
 from groundstation.chapters.wording import number
 from groundstation.plots.axes import time_axis
@@ -57,8 +57,8 @@ def track_map(results: FlightResults) -> Plot | None:
     behind = () if corrected is None else (_ellipses(corrected, origin, larger, scale),)
     whole = _map(time, north, east, used, "Whole flight" if zoom else "", behind)
     is_polar = is_near_pole(latitude)
-    shore = _shore(whole, HALF_ASPECTS if zoom else ASPECTS, origin, is_polar=is_polar)
-    panels = [whole if shore is None else shore]
+    whole, of_shore = _shore(whole, HALF_ASPECTS if zoom else ASPECTS, origin, is_polar=is_polar)
+    panels = [whole]
     if zoom:
         panels.append(_map(time[taxi], north[taxi], east[taxi], used[taxi], "Taxi"))
     caption = f"Ring: start ({number(origin[0], 5, '°')}, {number(origin[1], 5, '°')})."
@@ -67,8 +67,7 @@ def track_map(results: FlightResults) -> Plot | None:
     if corrected is not None:
         size = f", drawn {number(larger, 0)} times their size" if larger > 1 else ""
         caption += f" Ellipses: 95 % of the corrected position{size}."
-    if shore is not None:
-        caption += coast.CAPTION
+    caption += of_shore
     if is_polar or _extent(north, east) > LARGEST_OF_ONE_SCALE_M:
         caption += " Scale and north are those at the start."
     alt = "Map of the track in metres north and east of the start."
@@ -134,19 +133,22 @@ def _map(time: Floats, north: Floats, east: Floats, used: Flags, title: str, beh
 
 def _shore(
     panel: Panel, aspects: tuple[float, float], origin_deg: tuple[float, float], *, is_polar: bool
-) -> Panel | None:
-    """Return a map with the coast beneath it; None without a coast in its frame."""
+) -> tuple[Panel, str]:
+    """Return a map with the coast beneath it, its axes as they were, and its caption.
+
+    The map is as it was, its caption empty, without a coast in its frame.
+    """
     found = [extent(panel.marks).tolist() for extent in (x_extent, y_extent)]
     ends = [padded(low, high, MARGIN) for low, high in found]
     across, up = (0.5 * panel.unit_m * (high - low) for low, high in ends)
     middle = tuple(0.5 * panel.unit_m * (low + high) for low, high in ends)
     half = max(across, aspects[0] * up), max(up, across / aspects[1])
-    rings = coast.coast((middle[0], middle[1]), half, origin_deg, is_polar=is_polar)
-    if not rings:
-        return None
+    shore = coast((middle[0], middle[1]), half, origin_deg, is_polar=is_polar)
+    if shore is None:
+        return panel, ""
     x, y = (replace(axis, low=low, high=high) for axis, (low, high) in zip((panel.x, panel.y), ends, strict=True))
-    marks = (coast.outlines(rings, 1.0 / panel.unit_m), *panel.marks)
-    return replace(panel, marks=marks, x=x, y=y)
+    marks = (shore.outlines(panel.unit_m), *panel.marks)
+    return replace(panel, marks=marks, x=x, y=y), f" {shore.caption}"
 
 
 def _at_least(values: Floats, first: int) -> tuple[float, float]:

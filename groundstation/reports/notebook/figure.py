@@ -247,7 +247,7 @@ def _labels(axes: Axes, box: Box, height: float) -> None:
 
 
 def _map_scale(axes: Axes, box: Box) -> None:
-    """Draw scale bar and arrow of a map; the bar follows the axes."""
+    """Draw scale bar and arrow of a map, which stay at their places when the axes are moved."""
     scale = map_scale_of(box)
     if scale is None:
         return

@@ -24,7 +24,10 @@ PER_KM = 1000.0
 
 @dataclass(frozen=True)
 class MapScale:
-    """Places of bar, number, arrow and letter: points from the upper left corner."""
+    """Places of bar, its number, arrow and letter.
+
+    Units are points from the upper left corner of the picture.
+    """
 
     left: float
     right: float
@@ -72,7 +75,9 @@ def map_scale_of(box: Box) -> MapScale | None:
 
 
 def round_length_m(most_m: float) -> float:
-    """Return the greatest of 1, 2, 5 times a power of ten that is not more; else 0.
+    """Return the greatest of 1, 2 and 5 times a power of ten that is not more.
+
+    0 where there is none.
 
     Examples
     --------
@@ -98,7 +103,7 @@ def length_text(length_m: float) -> str:
 
 
 def _corner(box: Box, wide: float, high: float) -> tuple[float, float]:
-    """Return left and lower end of a field in the corner with the fewest places."""
+    """Return the left and lower end of a field in the corner that is the emptiest."""
     lefts = box.right - FROM_EDGE_PT - wide, box.left + FROM_EDGE_PT
     bottoms = box.bottom - FROM_EDGE_PT, box.top + FROM_EDGE_PT + high
     corners = [(left, bottom) for bottom in bottoms for left in lefts]

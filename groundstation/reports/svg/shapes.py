@@ -235,8 +235,10 @@ def _points(mark: Points, box: Box) -> str:
 def _outlines(mark: Outlines, box: Box) -> str:
     rings = [mark.rings[place] for place in thin(len(mark.rings), MOST_RINGS).tolist()]
     parts = []
-    for ring in rings:
-        x, y = box.across(ring[:, 0]), box.down(ring[:, 1])
+    corners = np.concatenate([np.zeros((0, 2)), *rings])
+    across, down = box.across(corners[:, 0]), box.down(corners[:, 1])
+    ends = np.cumsum([len(ring) for ring in rings])
+    for x, y in zip(np.split(across, ends[:-1]), np.split(down, ends[:-1]), strict=True):
         rows, starts = shown_rows(x, y, MOST_POINTS // 2)
         parts.append(path.polyline(x[rows], y[rows], starts))
     colour, told = colours.COLOURS[mark.role], "".join(parts)
