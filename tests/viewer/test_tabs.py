@@ -29,8 +29,7 @@ BY_HAND = {
     "inertial/tab": {"lane"},  # states of the filter: grounds of the page's panels
     "cooperative/tab": {"lines", "spans"},  # sources heard, lanes of links
     "planning/landing/tab": {"lines"},  # speed of the moving point, beside its space
-    "magnetic/tab": {"dots"},  # a deviation applied to the log
-    "health/tab": {"spans"},  # a lane for each check, whose states are grades: the page has all in one panel
+    "magnetic/tab": {"dots"},  # a lane for each check, whose states are grades: the page has all in one panel
 }
 BY_RERUN = {  # spaces, maps, tensors, and what grows with time
     *("planning/session/tab", "planning/session/placement_tab", "planning/landing/tab", "landing/tab"),

@@ -197,7 +197,10 @@ class GnssReceiver:
         """Share of the recorded time after the first fix in some states."""
         before_s = 0.0 if self.first_fix_s is None else self.first_fix_s - self.start_s
         every = [(one.state, one.seconds) for one in self.states if one.state not in WITHOUT_RECORD]
-        whole_s = sum(seconds for _state, seconds in every) - before_s
+        fixed_s = sum(seconds for state, seconds in every if state not in WITHOUT_FIX)
+        whole_s = max(
+            sum(seconds for _state, seconds in every) - before_s, fixed_s
+        )  # nothing recorded counts in neither
         if not whole_s > 0.0:
             return self.share(*states)
         return sum(seconds for state, seconds in every if state in states) / whole_s

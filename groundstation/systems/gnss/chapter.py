@@ -56,7 +56,7 @@ def _claim(answer: GnssReception) -> Claim:
     main = answer.receiver
     fixes = [one for one in main.states if one.state not in (*WITHOUT_FIX, *WITHOUT_RECORD)]
     best = max(fixes, key=lambda one: one.share, default=None)
-    value = "" if best is None else share_text(main.share_after_first_fix(best.state)).replace(" %", "%")
+    value = "" if best is None else share_text(main.share_after_first_fix(best.state))
     remark = "" if best is None else name_of(best.state)
     told = [
         ("Satellites", number(main.satellites_used, 0), "median"),
@@ -68,8 +68,21 @@ def _claim(answer: GnssReception) -> Claim:
         claimed = "" if stood.claimed_m is None else f"{length_text(stood.claimed_m)} claimed"
         told.append(("Scatter", length_text(stood.scatter_m), claimed))
     figures = tuple(one for one in told if one[1] != "—")
-    sentences = tuple(with_full_stop(typeset(reason)) for reason in answer.reasons)
-    return Claim(Rank.GNSS, MARKS[answer.grade], typeset(answer.sentence), value, remark, sentences, figures)
+    above = _against(answer)
+    sentences = tuple(with_full_stop(typeset(reason)) for reason in answer.reasons if reason != above)
+    return Claim(Rank.GNSS, MARKS[answer.grade], _headline(answer), value, remark, sentences, figures)
+
+
+def _headline(answer: GnssReception) -> str:
+    """Return the sentence, behind what is against the reception, with a capital."""
+    told = "; ".join(filter(None, (_against(answer), answer.sentence)))
+    return typeset(f"{told[:1].upper()}{told[1:]}")
+
+
+def _against(answer: GnssReception) -> str:
+    """Return the first reason against the reception that the sentence does not tell anyway; empty without one."""
+    reasons = answer.reasons if answer.grade in ("warn", "bad") else ()
+    return next((one for one in reasons if not one.startswith("RTK not fixed") and one not in answer.sentence), "")
 
 
 def _states(answer: GnssReception) -> Grid:

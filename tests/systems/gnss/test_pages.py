@@ -35,6 +35,22 @@ def test_the_chapter_says_the_sentence_and_not_logged() -> None:
     assert "not logged" in text and section.claim.mark.text == "Good"
 
 
+def test_the_page_opens_with_what_is_against_the_reception() -> None:
+    few = gnss(results_of(table(times(), satellites_used=np.full(len(times()), 4.0))))
+    assert few is not None and few.claim is not None and few.claim.mark.tone == "bad"
+    assert few.claim.headline.startswith("Fewer than 5 satellites 100 % of the time; single (3D) throughout")
+    assert not any("Fewer than 5" in one for one in few.claim.sentences), "told once"
+    good = gnss(results_of(table(times())))
+    assert good is not None and good.claim is not None and good.claim.value == "100 %"
+    assert good.claim.headline.startswith("Single (3D) throughout, nothing lost")
+
+
+def test_shares_after_the_first_fix_are_never_more_than_all() -> None:
+    found = open_flight(real_log("dataflash/plane_4.2.3_pilot0004.BIN")).results.answer(GnssReception)
+    assert found is not None
+    assert 0.9 < found.receiver.share_after_first_fix("3d") <= 1.0
+
+
 def test_a_chapter_of_nothing_known_is_not_judged() -> None:
     section = gnss(results_of(table(times(), fix=None, satellites_used=None, hdop=None)))
     assert section is not None and section.claim is not None and section.claim.mark.tone == "unknown"
