@@ -97,11 +97,12 @@ def _read(flight: "Flight", known: Known) -> _Read:
     from groundstation.systems.health.evidence import in_the_air
     from groundstation.systems.health.parameters import events as events_of_settings
     from groundstation.systems.health.parameters import settings_of
+    from groundstation.systems.health.world_field import against_the_model
 
     autopilot = autopilot_of(flight)
     if autopilot is None:
         raise NotAssessableError(CODE, "the log is of no autopilot whose messages are known")
-    evidence, events = autopilot.evidence(flight), autopilot.events(flight)
+    evidence, events = against_the_model(flight, autopilot.evidence(flight)), autopilot.events(flight)
     if not events and not any(bool(np.isfinite(one.value).any()) for one in evidence):
         raise NotAssessableError(CODE, "the log holds no field that a check of the autopilot judges")
     air, stated = in_the_air(flight, known), settings_of(flight, known)

@@ -15,6 +15,7 @@ from groundstation.base.signals import topics_of_kind
 from groundstation.results.roles import Delays
 from groundstation.systems.health.answer import ChangedParameter, SettingFound, Verdict
 from groundstation.systems.health.evidence import Event, Spans
+from groundstation.systems.health.world_field import first_position
 from groundstation.systems.known import Known
 from groundstation.tables.parameters import Parameters, parameters_of
 from groundstation.tables.table import Flight
@@ -123,7 +124,7 @@ def _declination(flight: Flight, _known: Known, parameters: Parameters) -> Itera
         yield SettingFound(name, what, "deg", stated, None, None, "not_logged", "no compass in use", source)
         return
     is_own = stated == 0.0 and (parameters.value("COMPASS_AUTODEC") == 1.0 or name != "COMPASS_DEC")
-    place = _first_position(flight)
+    place = first_position(flight)
     reason = "0: by the autopilot's own table" if is_own else _UNTOLD if place is None else ""
     if is_own or place is None or not flight.has_utc:
         reason = reason or "the log has no date"
@@ -138,18 +139,6 @@ def _declination(flight: Flight, _known: Known, parameters: Parameters) -> Itera
     sigma = float(model.sigma_deg[0])
     is_off = abs(float(wrap_180(found - stated))) > max(DECLINATION_WARN_DEG, SIGMAS * sigma)
     yield SettingFound(name, what, "deg", stated, found, sigma, "warn" if is_off else "pass", model.model, source)
-
-
-def _first_position(flight: Flight) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    for topic in topics_of_kind("gnss", flight.topics()):
-        table = flight[topic]
-        if not table.has("latitude_deg", "longitude_deg"):
-            continue
-        rows = np.flatnonzero(table.valid("latitude_deg", "longitude_deg"))
-        if len(rows):
-            one = table.take(rows[:1])
-            return one.values("latitude_deg"), one.values("longitude_deg"), np.nan_to_num(one.values("altitude_msl_m"))
-    return None
 
 
 def _arm(_flight: Flight, _known: Known, parameters: Parameters) -> Iterator[SettingFound]:

@@ -8,11 +8,12 @@ from collections.abc import Mapping, Sequence
 
 from groundstation.systems.health.answer import FIRST, Check
 
-MOST_OTHERS = 2
+MOST_BAD = 4
 MORE = re.compile(r" and \d+ more$")
 MOSTLY = 0.8  # of the time: a longer span is "throughout"
 QUOTED = ("faults", "battery", "gnss", "link")  # checks of which what was said is quoted
 LONGEST = 50  # characters of a message that the sentence quotes
+NAMES: Mapping[str, str] = {"gnss": "GNSS", "innovations": "filter", "vibration": "vibration"}
 GOOD: Mapping[str, str] = {"gnss": "GNSS good", "innovations": "filter healthy", "vibration": "vibration low"}
 WARN: Mapping[str, str] = {
     "gnss": "GNSS weak",
@@ -72,19 +73,23 @@ FAIL: Mapping[str, str] = {
 def told(checks: Sequence[Check]) -> str:
     """Return the sentence.
 
-    GNSS, filter and vibration, then what else warns or fails, the worst first.
+    What warns or fails, the worst first, then what of GNSS, filter and vibration is good, then what is not logged.
     """
     known = {one.key: one for one in checks}
     first = [known[key] for key in FIRST if key in known]
-    parts = [_part(one) for one in first]
-    if all(one.verdict == "not_logged" for one in first):
-        parts = ["GNSS, filter and vibration not logged"]
-    others = sorted((one for one in checks if one.key not in FIRST and one.is_bad), key=_gravity)
-    parts += [_part(one) for one in others[:MOST_OTHERS]]
-    if len(others) > MOST_OTHERS:
-        parts.append(f"and {len(others) - MOST_OTHERS} more")
-    shown = ", ".join(filter(None, parts))
+    bad = sorted((one for one in checks if one.is_bad), key=lambda one: (_gravity(one), one.key not in FIRST))
+    parts = [_part(one) for one in bad[:MOST_BAD]]
+    if len(bad) > MOST_BAD:
+        parts.append(f"and {len(bad) - MOST_BAD} more")
+    good = [_part(one) for one in first if one.verdict == "pass"]
+    absent = [NAMES[one.key] for one in first if one.verdict == "not_logged"]
+    unknown = [f"{_listed(absent)} not logged"] if absent else []
+    shown = "; ".join(", ".join(filter(None, group)) for group in (parts, [*good, *unknown]) if any(group))
     return shown[:1].upper() + shown[1:]
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _gravity(check: Check) -> bool:
@@ -95,9 +100,7 @@ def _part(check: Check) -> str:
     if check.verdict == "pass":
         return GOOD.get(check.key, "")
     if not check.is_bad:
-        return {"gnss": "GNSS not logged", "innovations": "filter not logged", "vibration": "vibration not logged"}.get(
-            check.key, ""
-        )
+        return ""
     special = _special(check)
     if special.endswith("fix"):
         return special

@@ -120,7 +120,7 @@ def test_a_ratio_above_the_limits_is_told_with_sensor_span_and_share(make: Calla
     assert (check.verdict, measure.sensor) == ("fail", "horizontal position")
     assert (measure.span_start_s, measure.span_end_s) == pytest.approx((40.0, 60.0), abs=0.21)
     assert measure.red_share == pytest.approx(0.25, abs=0.01)
-    assert "filter rejects its sensors 0:40-" in answer.sentence
+    assert "Filter rejects its sensors 0:40-" in answer.sentence
 
 
 def test_a_ratio_that_stays_zero_is_of_a_sensor_that_is_not_used() -> None:
@@ -204,7 +204,7 @@ def test_gnss_without_a_fix_claims_nothing_and_fails() -> None:
     check = answer.check("gnss")
     assert check.verdict == "fail"
     assert {one.quantity for one in check.measures} & {"eph_m", "hdop", "speed_accuracy_mps"} == set()
-    assert answer.sentence.startswith("GNSS never had a fix, ")
+    assert answer.sentence.startswith("GNSS never had a fix; ")
 
 
 def test_states_that_the_receiver_does_not_know_are_not_logged() -> None:
@@ -231,7 +231,7 @@ def test_vibration_is_read_in_the_unit_of_its_era() -> None:
     )
     answer = answered(*rest, shaken)  # its mean is small, as of a log that another tool called good
     assert answer.check("vibration").verdict == "fail"
-    assert "vibration high 0:40-1:00" in answer.sentence
+    assert "Vibration high 0:40-1:00" in answer.sentence
 
 
 def test_one_imu_is_not_compared_with_itself() -> None:
@@ -272,7 +272,7 @@ def test_a_failsafe_is_a_warning_and_an_error_a_failure() -> None:
     check = answer.check("faults")
     assert (check.verdict, check.reason, check.first_event_s) == ("fail", "Motor 2 failed", 45.0)
     assert (answer.check("battery").verdict, answer.check("battery").reason) == ("fail", "Low battery")
-    assert answer.sentence.endswith("“Motor 2 failed” at 0:45, “Low battery” at 0:50")
+    assert answer.sentence.startswith("“Motor 2 failed” at 0:45, “Low battery” at 0:50")
     only = table("raw.ulog.text", [40.0], severity=["info"], text=["\x1b[33m[commander] Failsafe mode: RTL\x1b[0m"])
     check = answered(*new(), only).check("faults")
     assert (check.verdict, check.reason) == ("warn", "Failsafe mode: RTL")
