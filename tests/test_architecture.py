@@ -96,7 +96,6 @@ FEWEST_LINES = 25
 MAY_BE_SHORT = {  # beside __init__.py
     "__main__.py": "python -m groundstation",
     "base/version.py": "read by the build",
-    "chapters/overview.py": "a chapter of its own, as those beside it",
     "pipeline/verbs/schema.py": "a command: python -m",
     "results/file_names.py": "tells results from logs without loading either",
     "results/forecast_methods.py": "words of the forecast for rooms that name no system",
