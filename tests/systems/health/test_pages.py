@@ -1,0 +1,50 @@
+"""Figures and page of autopilot health: lanes coloured by grade, quantities against their limits."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from groundstation.chapters.markdown import markdown
+from groundstation.plots.marks import Curve, Lanes, Limit
+from groundstation.results.flight import FlightResults
+from groundstation.systems.health.chapter import health
+from groundstation.systems.health.plots import PLOTS
+from tests.report_example import example
+from tests.systems.health.made import table
+from tests.systems.health.test_px4 import TIME, answered, during, new
+
+
+@pytest.fixture(scope="module")
+def results() -> FlightResults:
+    """Results of a flight that shakes from 40 to 60 s, and has only this answer."""
+    metric = during(40.0, 60.0, 34.4, 3.1)
+    shaken = table("raw.vehicle_imu_status", TIME, accel_vibration_metric=metric, delta_angle_coning_metric=1e-9)
+    found = answered(*(one for one in new() if "imu_status" not in one.topic), shaken)
+    return replace(example(), answers={"health": found}, figures=found.figures)
+
+
+def test_lanes_are_red_where_the_limit_was_passed(results: FlightResults) -> None:
+    plot = PLOTS["health.lanes"](results)
+    assert plot is not None
+    lanes = [mark for mark in plot.rows[0].panels[0].marks if isinstance(mark, Lanes)]
+    (red,) = [mark for mark in lanes if mark.role == "bad"]
+    assert set(red.state) == {"vibration"} and "vibration" in red.order
+    assert red.start.min() == pytest.approx(40.0, abs=1.0) and red.end.max() == pytest.approx(60.0, abs=1.0)
+
+
+def test_a_quantity_stands_against_its_limits(results: FlightResults) -> None:
+    plot = PLOTS["health.panels"](results, "vibration")
+    assert plot is not None and plot.name == "health.panels.vibration"
+    marks = [mark for row in plot.rows for panel in row.panels for mark in panel.marks]
+    assert {mark.role for mark in marks if isinstance(mark, Limit)} >= {"warn", "bad"}
+    assert max(float(np.nanmax(mark.y)) for mark in marks if isinstance(mark, Curve)) == pytest.approx(34.4, rel=0.01)
+    assert PLOTS["health.panels"](results, "battery") is None, "nothing logged, nothing drawn"
+
+
+def test_the_chapter_opens_with_what_failed(results: FlightResults) -> None:
+    section = health(results)
+    assert section is not None and section.claim is not None
+    assert section.claim.mark.tone == "bad" and section.claim.is_danger
+    assert section.claim.headline.startswith("Vibration high 0:40-1:00; GNSS good, filter healthy")
+    assert "Not logged" in markdown(section)
