@@ -143,7 +143,8 @@ def _by_flying(flight: Flight) -> Spans:
 
 
 def _by_phases(flight: Flight, phases: Phases) -> Spans:
-    found = [one for one in phases.intervals if one.phase == "airborne"]
+    """Return the flight by phases, those that speed and height make likely among them."""
+    found = [one for one in phases.likely or phases.intervals if one.phase == "airborne"]
     start = np.array([flight.start_ns + round(one.start_s * NS_PER_S) for one in found], dtype=np.int64)
     end = np.array([flight.start_ns + round(one.end_s * NS_PER_S) for one in found], dtype=np.int64)
     return Spans(start, end, phases.method)

@@ -10,6 +10,8 @@ from groundstation.systems.health.checks import CHECKS, judge
 from groundstation.systems.health.evidence import Event, Evidence, Spans, in_the_air
 from groundstation.systems.health.limits import Limit, shipped, thresholds
 from groundstation.systems.health.settings import HealthSettings
+from groundstation.systems.known import Known
+from groundstation.tables.phases import PhaseInterval, Phases
 from groundstation.tables.table import Flight
 from tests.systems.health.made import KNOWN, NS, flight, seconds, table
 from tests.systems.health.thresholds_table import PAGE, page
@@ -164,3 +166,12 @@ def test_spans_tell_time_before_and_within() -> None:
 def test_page_has_the_shipped_thresholds() -> None:
     """Written by ``python -m tests.systems.health.thresholds_table``."""
     assert PAGE.read_text(encoding="utf-8") == page()
+
+
+def test_a_flight_that_speed_and_height_make_likely_is_judged() -> None:
+    proven = PhaseInterval(20.0, 40.0, "airborne")
+    likely = (proven, PhaseInterval(40.0, 80.0, "airborne", is_proven=False))
+    bare = Flight({"raw.X": table("raw.X", [0.0, 100.0], a=1.0)}, {}, 0, False, "made.bin")
+    air = in_the_air(bare, Known(Phases((proven,), "motion", likely=likely)))
+    assert air.seconds == pytest.approx(60.0)
+    assert in_the_air(bare, Known(Phases((proven,), "motion"))).seconds == pytest.approx(20.0)
