@@ -80,7 +80,7 @@ def _headline(answer: GnssReception) -> str:
 
 
 def _against(answer: GnssReception) -> str:
-    """Return the first reason against the reception that the sentence does not tell anyway; empty without one."""
+    """Return the first reason against the reception that the sentence does not tell."""
     reasons = answer.reasons if answer.grade in ("warn", "bad") else ()
     return next((one for one in reasons if not one.startswith("RTK not fixed") and one not in answer.sentence), "")
 

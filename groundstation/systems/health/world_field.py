@@ -20,7 +20,7 @@ BY_BAND, BY_MODEL = "field_length_gauss", "field_against_model"
 
 
 def against_the_model(flight: Flight, evidence: Iterable[Evidence]) -> tuple[Evidence, ...]:
-    """Return the evidence, with lengths of the field as shares of the model's that they are off by."""
+    """Return the evidence, lengths of the field as shares that they are off the model's."""
     every = tuple(evidence)
     model = _model(flight) if any(one.quantity == BY_BAND for one in every) else None
     if model is None:
@@ -41,7 +41,7 @@ def against_the_model(flight: Flight, evidence: Iterable[Evidence]) -> tuple[Evi
 
 
 def first_position(flight: Flight) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """Return latitude, longitude and altitude of the first fix, shape (1,) each; None without one."""
+    """Return latitude, longitude and altitude of the first fix, shape (1,) each."""
     for topic in topics_of_kind("gnss", flight.topics()):
         table = flight[topic]
         if not table.has("latitude_deg", "longitude_deg"):
@@ -54,7 +54,7 @@ def first_position(flight: Flight) -> tuple[FloatArray, FloatArray, FloatArray] 
 
 
 def _model(flight: Flight) -> tuple[str, float] | None:
-    """Return name and length of the field of the model, gauss; None without a place, a date, or a model for it."""
+    """Return name and length, gauss, of the model's field; None where none serves."""
     place = first_position(flight)
     if place is None or not flight.has_utc:
         return None
