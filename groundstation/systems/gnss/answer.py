@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
+from groundstation.results.roles import WordsOfRecord
 
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
 
@@ -230,8 +231,12 @@ class ReceiverPair:
     lag_sigma_s: float | None
 
 
+TELLING = frozenset(("rtk_fixed", "rtk_float", "ppp", "dgnss", "2d", "dead_reckoning"))
+LEAST_TOLD = 0.2  # share of a kind of fix that is worth a word
+
+
 @dataclass(frozen=True)
-class GnssReception(Answer):
+class GnssReception(Answer, WordsOfRecord):
     """Reception of all receivers of a flight.
 
     ``main`` is the topic of the one with the most time with a fix, of which ``sentence`` speaks; ``reasons`` say what
@@ -253,3 +258,15 @@ class GnssReception(Answer):
     def receiver(self) -> GnssReceiver:
         """The one of which the sentence speaks."""
         return next(one for one in self.receivers if one.topic == self.main)
+
+    @property
+    def words_of_record(self) -> Mapping[str, str]:
+        """Kind of fix that held most of the time, where it is more than an ordinary one: "RTK fixed 65 %"."""
+        if self.receiver.first_fix_s is None:
+            return {"gnss": "never a fix"}
+        states = [one for one in self.receiver.states if one.state in TELLING]
+        best = max(states, key=lambda one: one.share, default=None)
+        if best is None or best.share < LEAST_TOLD:
+            return {}
+        share = min(self.receiver.share_after_first_fix(best.state), 1.0)
+        return {"gnss": f"{STATE_NAMES[best.state]} {100.0 * share:.0f} %"}

@@ -1,0 +1,48 @@
+"""First screens of recorded logs: what an owner sees in five seconds, by the table of docs/report.md."""
+
+import pytest
+
+import groundstation
+from groundstation.chapters.front import front
+from groundstation.systems import systems
+from tests.real_logs import real_log
+
+# Log: colour, word, part of the headline, part of the line on the recording.
+OPENS = {
+    "dataflash/erle_plane_4-12-2014_329.BIN": ("warn", "Left GNSS", "EKF1 and GNSS up to 181 m", "its end is cut off"),
+    "dataflash/copter_3.6.7_log0041.BIN": ("bad", "Failed", "Estimators disagree 1:18", "21 s of GNSS missing"),
+    "dataflash/plane_4.2.3_pilot0004.BIN": ("bad", "Failed", "GNSS bad throughout", "GNSS at 5 Hz"),
+    "ulog/px4_rs_esc_status.ulg": ("warn", "Warnings", "Vibration raised 0:12", "40 s of GNSS"),
+    "ulog/quadrotor_local.ulg": ("bad", "Failed", "“Low battery” at 1:19", "never a fix"),
+    "ulog/sample_px4_events.ulg": ("good", "Healthy", "GNSS good, filter healthy", "nothing lost"),
+    "gnss/walk_0827_gnss_1730_sf.pos": ("warn", "Warning", "RTK fixed 65 %", "GNSS (RTK fixed 65 %) at 4 Hz"),
+    "gnss/drive_0708_gnss_1934_sf.pos": ("good", "Good", "RTK fixed 99.6 %", "9:09 min of GNSS"),
+    "g1000/log_220416_161856_LFQA.csv": ("warn", "Warning", "Position jumps once", "3:12 min of GNSS, attitude"),
+    "foreign/robot_localization_jackal_test2.bag": ("plain", "Recorded", "61 s of attitude and odometry", ""),
+    "ch10/kc135_429_1553_1MB.c10": ("warn", "Recorded", "Messages without navigation", ""),
+    "ulog/Proto_FLT09_REENCODED_fixedwing.ulg": ("bad", "Left GNSS", "INS and GNSS up to 85.1 m", "8:50 min of GNSS"),
+    "ulog/pyulog_sample.ulg": ("bad", "Failed", "“no barometer found", "the recorder paused"),
+    "ulog/px4_rs_6ba1abc7.ulg": ("bad", "Failed", "Magnetic field wrong throughout", "26 s of GNSS"),
+    "dataflash/TestLog2_REENCODED_plane.BIN": ("warn", "Warnings", "Setpoints followed poorly", "nothing lost"),
+    "tlog/uavlogviewer_vtol.tlog": ("warn", "Warnings", "Sensor or estimator switched at 0:30", "RTK fixed"),
+    "gnss/walk_0827_gnss_1730.ubx": ("warn", "Warning", "RTK fixed 65 %", "2:14 min of GNSS"),
+    "gnss/rtklib_demo1_out.pos": ("warn", "Warning", "Position jumps 6 times", "RTK fixed 72 %"),
+    "gnss/inertialsense_Serial38400.nmea": ("good", "Good", "Single (3D) throughout", "19:23 min of GNSS"),
+    "gnss/ublox_ins_drive_pvat.ubx": ("good", "Good", "GNSS with INS throughout", "8:46 min of GNSS"),
+    "gnss/pygpsdata_testobsdata.log": ("plain", "Recorded", "Messages without navigation", ""),
+    "g1000/log_210623_141501_TEST1.csv": ("warn", "Not stabilised", "Landing, course 56.5", "1:18:02 h of GNSS"),
+    "approach/coreg.hdf5": ("plain", "Recorded", "1:59:27 h of heading", ""),
+    "approach/flight_with_go_around_and_landing.hdf5": ("warn", "Not stabilised", "Landing, course 301.0", "3:43:59 h"),
+    "foreign/robot_localization_husky_test1.bag": ("good", "Good", "DGNSS throughout", "6:35 min of GNSS"),
+    "inertial/gv_ff02.csv": ("good", "Measured", "5773", "5:04:34 h of GNSS and INS at 1 Hz"),
+}
+
+
+@pytest.mark.real_log
+@pytest.mark.parametrize("name", OPENS)
+def test_a_recorded_log_opens_on_what_its_owner_asks(name: str) -> None:
+    tone, word, headline, line = OPENS[name]
+    top = front(groundstation.open(real_log(name)).results, systems().chapters)
+    assert top.verdict is not None and (top.verdict.tone, top.verdict.text) == (tone, word)
+    assert headline.lower() in top.headline.lower() and line in top.recorded
+    assert "No answer" not in top.line
