@@ -261,7 +261,7 @@ class GnssReception(Answer, WordsOfRecord):
 
     @property
     def words_of_record(self) -> Mapping[str, str]:
-        """Kind of fix that held most of the time, where it is more than an ordinary one: "RTK fixed 65 %"."""
+        """Kind of fix that held most, where it is no ordinary one: "RTK fixed 65 %"."""
         if self.receiver.first_fix_s is None:
             return {"gnss": "never a fix"}
         states = [one for one in self.receiver.states if one.state in TELLING]
