@@ -61,6 +61,8 @@ CONVERSIONS: Mapping[str, tuple[str, float]] = MappingProxyType(
         "dbhz": ("dbhz", 1.0),
         "s": ("s", 1.0),
         "ms": ("s", 1e-3),
+        "us": ("s", 1e-6),
+        "c": ("c", 1.0),
         "": ("", 1.0),
     }
 )
