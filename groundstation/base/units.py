@@ -69,7 +69,9 @@ CONVERSIONS: Mapping[str, tuple[str, float]] = MappingProxyType(
 
 
 def factor_to(unit: str, wanted: str) -> float | None:
-    """Return the factor from a unit to that of a field; None when it is of another kind or unknown.
+    """Return the factor from a unit to that of a field.
+
+    None when it is of another kind, or unknown.
 
     Examples
     --------

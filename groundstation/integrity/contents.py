@@ -175,7 +175,7 @@ class Contents:
         return found if inertial is None else tuple(replace(one, at_end=inertial.at_end(one.name)) for one in found)
 
     def increments_s(self, topic: str) -> float | None:
-        """Return the time that the increments of an inertial unit cover; None where there are none."""
+        """Return the time that the increments of an inertial unit cover; None without any."""
         inertial = self._topics[topic].inertial
         return inertial.increments_s if inertial is not None and inertial.increments_s else None
 

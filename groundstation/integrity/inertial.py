@@ -1,4 +1,4 @@
-"""Counts of the samples of an inertial unit that met the end of their range, batch by batch."""
+"""Count of the samples of an inertial unit at the end of its range, batch by batch."""
 
 from dataclasses import dataclass, field
 
@@ -91,7 +91,10 @@ class InertialTally:
 
 
 def _rate_of(name: str, column: Column, batch: RecordBatch) -> FloatArray | None:
-    """Return rates in degrees per second or specific force, of samples or of increments; None of another field."""
+    """Return rates in degrees per second, or specific force; None of another field.
+
+    Those of increments are means over their interval.
+    """
     if name.startswith(("rate_", "accel_")):
         values = column.values[column.mask].astype(np.float64)
     elif name.startswith("delta_"):

@@ -256,7 +256,7 @@ def _feed(found: BagSurvey, topic: str, unit: list[SeenMessages]) -> None:
 
 
 def _feed_imu(found: BagSurvey, named: set[str]) -> None:
-    """Map the messages of every IMU that gives rates and specific force to ``imu``, each to its own."""
+    """Map the messages of every IMU with rates and specific force to an ``imu`` of its own."""
     units = [seen for seen in found.sources if seen.rule is None and _serves(seen)]
     units = [seen for seen in units if MESSAGES[seen.connection.type].role == "imu"]
     feeds = [(seen, TopicFeed("imu", MESSAGES[seen.connection.type].needs, imu_samples)) for seen in units]
