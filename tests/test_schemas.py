@@ -14,6 +14,7 @@ from groundstation.store.schema import DESCRIPTORS, MESSAGE_OF_KIND, canonical_t
 SCHEMAS = Path(__file__).parents[1] / "schemas"
 PROTO_TYPE = {
     "double": FieldDescriptorProto.TYPE_DOUBLE,
+    "single": FieldDescriptorProto.TYPE_FLOAT,
     "bool": FieldDescriptorProto.TYPE_BOOL,
     "text": FieldDescriptorProto.TYPE_STRING,
 }
@@ -42,7 +43,9 @@ def test_compiled_descriptors_are_fresh(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", TOPICS)
 def test_schema_equals_signals(kind: str) -> None:
     names_and_types = [(field.name, field.type) for field in canonical_type(kind).own_fields]
-    assert names_and_types == [(field.name, PROTO_TYPE[field.kind]) for field in TOPICS[kind]]
+    assert names_and_types == [
+        (field.name, PROTO_TYPE["single" if field.is_single else field.kind]) for field in TOPICS[kind]
+    ]
 
 
 def test_every_kind_has_a_message_and_every_message_a_kind() -> None:

@@ -54,10 +54,14 @@ class StuckStretch:
 
 @dataclass(frozen=True, kw_only=True)
 class FieldEntry:
-    """Counts of one field: samples, NaN of the device, values out of range, stuck stretches."""
+    """Counts of one field: samples, NaN of the device, values out of range, stuck stretches.
+
+    ``at_end``: samples of an inertial unit at the end of its range.
+    """
 
     schema_name: ClassVar[str] = "ledger_field"
 
+    at_end: int = field(default=0, metadata=LEFT_OUT_WHEN_DEFAULT)
     first_out_of_range: OutOfRange | None = field(default=None, metadata=LEFT_OUT_WHEN_DEFAULT)
     nan: int = 0
     out_of_range: int = 0
@@ -97,7 +101,8 @@ class CounterEntry:
 class TopicEntry:
     """Counts of one topic; rate and coverage are None where no step is usual.
 
-    ``losses`` counts by kind what was unreadable.
+    ``losses`` counts by kind what was unreadable. Of an inertial unit: ``jitter_s`` of its steps, and the share of the
+    time that its increments cover.
     """
 
     schema_name: ClassVar[str] = "ledger_topic"
@@ -109,6 +114,8 @@ class TopicEntry:
     fields: Mapping[str, FieldEntry] = field(default_factory=dict)
     first: str
     gaps: TopicGaps
+    increments_share: float | None = field(default=None, metadata=LEFT_OUT_WHEN_DEFAULT)
+    jitter_s: float | None = field(default=None, metadata=LEFT_OUT_WHEN_DEFAULT)
     last: str
     losses: Mapping[str, int] = field(default_factory=dict)
     nominal_rate_hz: float | None

@@ -22,12 +22,14 @@ class Field:
     name : str
         ``quantity_..._unit``; no suffix means no unit.
     unit : str
-        As in the name: deg, m, mps, dps, mps2, nt, a, dots, mhz, dbhz, s, or empty.
+        As in the name: deg, rad, m, mps, dps, mps2, nt, a, dots, mhz, dbhz, s, c, or empty.
     kind : {'double', 'bool', 'text'}
     low, high : float
         Physical range; values outside are findings, not corrected.
     is_heading : bool
         Lives on the circle [0, 360): never averaged or interpolated as a plain number.
+    is_single : bool
+        Stored in single precision: of a sensor that is sampled fast, whose noise is far above the rounding.
     """
 
     name: str
@@ -36,10 +38,15 @@ class Field:
     low: float = float("-inf")
     high: float = float("inf")
     is_heading: bool = False
+    is_single: bool = False
 
 
 def _double(name: str, unit: str, low: float = float("-inf"), high: float = float("inf")) -> Field:
     return Field(name, unit, "double", low, high)
+
+
+def _single(name: str, unit: str, low: float = float("-inf"), high: float = float("inf")) -> Field:
+    return Field(name, unit, "double", low, high, is_single=True)
 
 
 def _heading(name: str) -> Field:
@@ -82,6 +89,24 @@ _INS = (
     *_POSITION_SIGMA,
     _double("velocity_sigma_mps", "mps", 0.0, 1_000.0),
 )
+# Standard deviations by axis, beside those that a receiver states for all; that of height is vertical_sigma_m.
+_AXIS_SIGMAS = (
+    *(_double(f"position_{axis}_sigma_m", "m", 0.0, 100_000.0) for axis in ("north", "east")),
+    *(_double(f"velocity_{axis}_sigma_mps", "mps", 0.0, 1_000.0) for axis in ("north", "east", "down")),
+)
+# Increments over an interval that ends at the time of the record, or rates and specific force at that time.
+_IMU = (
+    *(_single(f"delta_angle_{axis}_rad", "rad", -100.0, 100.0) for axis in "xyz"),
+    *(_single(f"delta_velocity_{axis}_mps", "mps", -1_000.0, 1_000.0) for axis in "xyz"),
+    _single("interval_s", "s", 0.0, 10.0),
+    _single("velocity_interval_s", "s", 0.0, 10.0),
+    *(_single(f"rate_{axis}_dps", "dps", -4_000.0, 4_000.0) for axis in "xyz"),
+    *(_single(f"accel_{axis}_mps2", "mps2", -1_000.0, 1_000.0) for axis in "xyz"),
+    _flag("is_integral"),
+    _single("temperature_c", "c", -100.0, 200.0),
+    _single("gyro_clipping", "", 0.0),
+    _single("accel_clipping", "", 0.0),
+)
 # Protection levels by the satellite-based augmentation and by fault detection in the receiver.
 _PROTECTION = tuple((axis, by) for axis in ("horizontal", "vertical") for by in ("sbas", "fd"))
 _RELATIVE_BEARING = _double("relative_bearing_deg", "deg", -360.0, 360.0)
@@ -107,7 +132,9 @@ TOPICS: Mapping[str, tuple[Field, ...]] = MappingProxyType(
             _double("satellites_tracked", "", 0.0, 200.0),
             _double("cn0_dbhz", "dbhz", 0.0, 100.0),
             _double("age_of_corrections_s", "s", 0.0, 1e6),
+            *_AXIS_SIGMAS,
         ),
+        "imu": _IMU,
         "onboard": (
             _double("heading_error_deg", "deg", -180.0, 180.0),
             _double("precision_deg", "deg", 0.0, 360.0),

@@ -55,6 +55,7 @@ UNITS: Mapping[str, UnitName] = MappingProxyType(
         "s": UnitName("s", decimals=3),
         "m": UnitName("m", decimals=3),
         "a": UnitName("A"),
+        "c": UnitName("°C", "C", 2),
     }
 )
 

@@ -61,6 +61,35 @@ CONVERSIONS: Mapping[str, tuple[str, float]] = MappingProxyType(
         "dbhz": ("dbhz", 1.0),
         "s": ("s", 1.0),
         "ms": ("s", 1e-3),
+        "us": ("s", 1e-6),
+        "c": ("c", 1.0),
         "": ("", 1.0),
     }
 )
+
+
+def factor_to(unit: str, wanted: str) -> float | None:
+    """Return the factor from a unit to that of a field.
+
+    None when it is of another kind, or unknown.
+
+    Examples
+    --------
+    >>> factor_to("rad", "rad"), factor_to("kt", "mps") == MPS_PER_KNOT, factor_to("m", "deg")
+    (1.0, True, None)
+    """
+    measured, factor = CONVERSIONS.get(unit, (None, 0.0))
+    if measured == "deg" and wanted == "rad":
+        return 1.0 if unit == "rad" else factor / DEG_PER_RAD
+    return factor if measured == wanted else None
+
+
+def units_of(wanted: str) -> tuple[str, ...]:
+    """Return the units that a field may be given in, by name.
+
+    Examples
+    --------
+    >>> units_of("a"), units_of("c")
+    (('a', 'ma'), ('c',))
+    """
+    return tuple(name for name in CONVERSIONS if name and factor_to(name, wanted) is not None)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from groundstation.base.records import Column, Int64Array, RecordBatch
 from groundstation.base.signals import is_canonical
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.contradictions import Contradiction, contradictions
+from groundstation.integrity.inertial import InertialTally, is_inertial
 from groundstation.integrity.ledger import FieldCounts
 from groundstation.integrity.limits import Thresholds
 from groundstation.integrity.sequence import Counter, Sequence, counters_of
@@ -100,6 +101,7 @@ class _FieldTally:
 class _TopicTally:
     fields: dict[str, _FieldTally] = field(default_factory=dict)
     counters: dict[str, Counter] | None = None
+    inertial: InertialTally | None = None
 
 
 class Contents:
@@ -131,6 +133,9 @@ class Contents:
         for name, counter in tally.counters.items():
             if name in batch.columns:
                 counter.add(batch.columns[name], batch.record_index, device_ns)
+        if is_inertial(batch.topic):
+            tally.inertial = tally.inertial or InertialTally()
+            tally.inertial.add(batch)
         self._motion.add(batch, device_ns)
         self._sample(batch, device_ns)
         if batch.topic == DROPOUTS and DROPOUT_LENGTH in batch.columns:
@@ -165,7 +170,14 @@ class Contents:
         tallies = self._topics[topic].fields
         watched = {name: tally.constancy for name, tally in tallies.items() if tally.constancy is not None}
         stuck = self._judge.stuck(topic, watched)
-        return tuple(tally.ledger(name, clock, stuck.get(name, ())) for name, tally in tallies.items())
+        found = tuple(tally.ledger(name, clock, stuck.get(name, ())) for name, tally in tallies.items())
+        inertial = self._topics[topic].inertial
+        return found if inertial is None else tuple(replace(one, at_end=inertial.at_end(one.name)) for one in found)
+
+    def increments_s(self, topic: str) -> float | None:
+        """Return the time that the increments of an inertial unit cover; None without any."""
+        inertial = self._topics[topic].inertial
+        return inertial.increments_s if inertial is not None and inertial.increments_s else None
 
     def contradictions(self, clock: ClockModel, metadata: Mapping[str, str]) -> tuple[Contradiction, ...]:
         """Places where the motion of the log contradicts itself."""

@@ -24,6 +24,7 @@ from groundstation.base.signals import is_canonical
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.contradictions import Contradiction
+from groundstation.integrity.inertial import is_inertial
 from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.integrity.rhythm import rhythm_of
 from groundstation.integrity.sequence import Sequence
@@ -39,7 +40,8 @@ class FieldCounts:
     """Counts of one field: samples, NaN of the device, values out of range, stuck stretches.
 
     ``first_out_of_range`` is the record of the first value outside the range; ``first_outside_ns`` and
-    ``last_outside_ns`` are the corrected times of the first and the last.
+    ``last_outside_ns`` are the corrected times of the first and the last. ``at_end``: samples of an inertial unit
+    at the end of its range.
     """
 
     name: str
@@ -52,11 +54,12 @@ class FieldCounts:
     first_outside_ns: int | None = None
     last_outside_ns: int | None = None
     stuck: tuple[StuckPlace, ...] = ()
+    at_end: int = 0
 
     @property
     def is_odd(self) -> bool:
         """Tell whether there is more to say of the field than its number of samples."""
-        return bool(self.nan or self.out_of_range or self.stuck)
+        return bool(self.nan or self.out_of_range or self.stuck or self.at_end)
 
     def entry(self, clock: ClockModel) -> FieldEntry:
         """Return the form to keep."""
@@ -64,6 +67,7 @@ class FieldCounts:
         low, high = (end if math.isfinite(end) else None for end in ends)
         time = None if first_ns is None else clock.text(first_ns)
         return FieldEntry(
+            at_end=self.at_end,
             present=self.present,
             nan=self.nan,
             out_of_range=self.out_of_range,
@@ -107,6 +111,10 @@ class TopicCounts:
     fields : tuple of FieldCounts
     sequences : tuple of Sequence
         Losses that record counters show.
+    jitter_s : float or None
+        Of an inertial unit: root mean square of its steps less the nominal one, gaps left out.
+    increments_share : float or None
+        Share of the time that its increments cover.
     """
 
     topic: str
@@ -122,6 +130,8 @@ class TopicCounts:
     gaps: Gaps
     fields: tuple[FieldCounts, ...]
     sequences: tuple[Sequence, ...] = ()
+    jitter_s: float | None = None
+    increments_share: float | None = None
 
     @property
     def span_s(self) -> float:
@@ -140,6 +150,8 @@ class TopicCounts:
             actual_rate_hz=_rounded(self.actual_rate_hz, 4),
             coverage=_rounded(self.coverage, 6),
             duplicates=self.duplicates,
+            jitter_s=_rounded(self.jitter_s, 7),
+            increments_share=_rounded(self.increments_share, 6),
             backward_steps=self.backward_steps,
             stray_rows=self.stray_rows,
             gaps=TopicGaps(
@@ -298,6 +310,7 @@ def topic_ledger(
     stray_rows: int,
     fields: tuple[FieldCounts, ...],
     sequences: tuple[Sequence, ...] = (),
+    increments_s: float | None = None,
     thresholds: Thresholds,
 ) -> TopicCounts:
     """Ledger of one topic from its corrected times in order, shape (n,), n at least 1."""
@@ -318,6 +331,8 @@ def topic_ledger(
         gaps=rhythm.gaps(topic, time_ns),
         fields=fields,
         sequences=sequences,
+        jitter_s=rhythm.jitter_s if is_inertial(topic) and rhythm.has_rate else None,
+        increments_share=increments_s * NS_PER_S / span_ns if increments_s and span_ns else None,
     )
 
 

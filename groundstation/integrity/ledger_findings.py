@@ -14,8 +14,9 @@ from groundstation.integrity.sequence import Sequence
 
 TOPIC_CODES = (
     *("time.duplicates", "data.gaps", "data.sequence", "data.sequence_reset"),
-    *("values.out_of_range", "values.nan", "values.stuck"),
+    *("values.out_of_range", "values.nan", "values.stuck", "values.saturated", "data.increments"),
 )
+WHOLE_SHARE = 0.9  # of the time: increments that cover less have gaps, or were thinned out
 _REMARKS_THAT_WARN = (
     *("assumed_utc", "assumed_year", "year_unknown", "clock_disagrees", "unreadable_metadata"),
     *("plug_in", "duplicate_column", "icd_of_another", "tmats_contradicted", "week_rollover", "week_number"),
@@ -28,6 +29,7 @@ def ledger_findings(ledger: LedgerCounts) -> tuple[Finding, ...]:
     Codes: those of :func:`clock_findings`, ``time.duplicates``, ``data.none``, ``data.gaps``, ``data.contradiction``,
     ``data.<kind of damage>`` (``data.truncated``, ``data.dropped_rows``, ``data.breaks_off`` ...),
     ``data.sequence``, ``data.sequence_reset``, ``values.out_of_range``, ``values.nan``, ``values.stuck``,
+    ``values.saturated`` and ``data.increments`` (inertial units),
     ``reader.<remark>`` (``reader.derived``, ``reader.assumed_utc`` ...).
     """
     damages = (damage_finding(damage) for damage in ledger.damages)
@@ -80,6 +82,9 @@ def _topic(topic: TopicCounts, ledger: LedgerCounts) -> Iterator[Finding]:
         yield Finding(severity, "data.gaps", text, topic.topic, place, len(topic.gaps))
     for sequence in topic.sequences:
         yield from _sequence(topic.topic, sequence, ledger.clock)
+    if topic.increments_share is not None and topic.increments_share < WHOLE_SHARE:
+        text = f"{topic.topic}: its increments cover {100.0 * topic.increments_share:.0f} % of the time"
+        yield Finding("warn", "data.increments", text, topic.topic)
     for field in topic.fields:
         yield from _field(topic.topic, field, ledger.clock)
 
@@ -93,6 +98,9 @@ def _field(topic: str, field: FieldCounts, clock: ClockModel) -> Iterator[Findin
         if field.first_outside_ns is not None:
             text += f" ({clock.text(field.first_outside_ns)})"
         yield Finding("warn", "values.out_of_range", text, topic, place, field.out_of_range)
+    if field.at_end:
+        text = f"{name}: {counted(field.at_end, 'sample')} of {field.present} at the end of the range"
+        yield Finding("warn", "values.saturated", text, topic, count=field.at_end)
     if field.nan:
         text = f"{name}: {field.nan} of {field.present} values are NaN as the device wrote them"
         yield Finding("info", "values.nan", text, topic, count=field.nan)

@@ -48,6 +48,12 @@ class Rhythm:
         expected = int(self.steps_ns.sum()) / self.period_ns + 1.0
         return min(1.0, (self.ahead + 1) / expected)
 
+    @property
+    def jitter_s(self) -> float:
+        """Root mean square of the steps less the period, without gaps."""
+        inside = self.steps_ns[self.steps_ns <= _longest_ns(self.period_ns, self.limits)]
+        return float(np.sqrt(np.mean(np.square(inside - self.period_ns)))) / NS_PER_S if len(inside) else 0.0
+
     def gaps(self, topic: str, time_ns: Int64Array) -> Gaps:
         """Return the steps that are too long, for the times that the steps are of."""
         if not self.has_gaps:

@@ -26,13 +26,18 @@ _HEADINGS = ("true_heading_deg", "magnetic_heading_deg", "track_deg")
 _POSITIONS = ("latitude_deg", "longitude_deg")
 _NOISY = (
     *(f"{quantity}_{axis}_{unit}" for quantity, unit in (("rate", "dps"), ("accel", "mps2")) for axis in "xyz"),
+    *(
+        f"delta_{quantity}_{axis}_{unit}"
+        for quantity, unit in (("angle", "rad"), ("velocity", "mps"))
+        for axis in "xyz"
+    ),
     *(f"field_{axis}_nt" for axis in ("forward", "right", "down")),
 )
 _WITNESSES = frozenset((*_POSITIONS, *_ALTITUDES, *_VELOCITIES, *_HEADINGS))
 _ATTITUDE = ("roll_deg", "pitch_deg")  # sampled beside the witnesses, which are no witnesses themselves
 _TIME = "device_ns"
 WATCHED = _WITNESSES | frozenset(_NOISY)
-_KINDS = ("ins", "gnss", "baro", "magnetometer")
+_KINDS = ("ins", "gnss", "baro", "magnetometer", "imu")
 
 
 @dataclass(frozen=True)

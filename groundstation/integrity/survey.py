@@ -176,6 +176,7 @@ def _ledgers(
                 stray_rows=order.stray_rows,
                 fields=contents.fields(topic, clock),
                 sequences=contents.sequences(topic, clock),
+                increments_s=contents.increments_s(topic),
                 thresholds=limits,
             )
             results.append((ledger, order.lateness_ns))
@@ -211,6 +212,7 @@ class Census:
                 stray_rows=0,
                 fields=self._contents.fields(topic, self._clock),
                 sequences=self._contents.sequences(topic, self._clock),
+                increments_s=self._contents.increments_s(topic),
                 thresholds=self._thresholds,
             )
             for topic, times in sorted(self._times.items())

@@ -13,7 +13,7 @@ from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage, Item, LogHeader, Remark
 from groundstation.base.slips import slips
 from groundstation.base.source_units import PREFIX, units_entry
-from groundstation.readers.dialect import Dialect, HeadLine, detect_encoding, head_lines
+from groundstation.readers.dialect import DELIMITERS, Dialect, HeadLine, detect_encoding, head_lines
 from groundstation.readers.misnamed import misnamed
 from groundstation.readers.profile import Profile, load, shipped
 from groundstation.readers.profile_fit import Fit, delimiter_of, fit_at, fit_below
@@ -156,8 +156,29 @@ def _fit(profile: Profile, encoding: str, lines: Sequence[HeadLine]) -> Fit | No
     return None
 
 
+def _without_header(profile: Profile, encoding: str, lines: Sequence[HeadLine]) -> Fit | None:
+    """Match a profile to a file without a header, most of whose first lines are rows of it."""
+    at = next((place for place, line in enumerate(lines) if not line.text.startswith("#")), len(lines))
+    top = lines[at - 1] if at else HeadLine(0, 0, "", ended=True)
+    rows = tuple(line.text for line in lines[at : at + DAMAGED_HEAD_LINES] if line.text.strip())
+    for delimiter in DELIMITERS:
+        header = HeadLine(top.number, top.next_byte, "", ended=True)
+        fit = Fit(profile, encoding, delimiter, profile.names, header, above=tuple(lines[:at]), first_rows=rows)
+        if rows and 2 * sum(map(fit.is_row, rows)) >= len(rows):
+            return fit
+    return None
+
+
 def _fitted(source: Source, profile: Profile) -> Fit:
     encoding = detect_encoding(source.head, source.name)
+    if profile.names:
+        found = _without_header(profile, encoding, head_lines(source, encoding))
+        if found is None:
+            expected = f"rows of {len(profile.names)} cells, numbers or times"
+            raise UnreadableLogError(
+                source.name, f"no row for profile {profile.name}", expected, f"check {profile.path.name}"
+            )
+        return found
     fit = _fit(profile, encoding, head_lines(source, encoding, MOST_LINES))
     if fit is None:
         wanted = ", ".join(dict.fromkeys((*profile.required, *profile.time.columns[:2])))
@@ -187,9 +208,12 @@ def _sections(
     profile = first.profile
     mark = mark_of(max((*profile.required, *profile.time.columns[:2]), key=len))
     stands_again, last_byte, own_until = False, None, first.last.number
-    for place in header_places(
-        source, first.last, first.encoding, mark, lambda line: bool(delimiter_of(line, profile))
-    ):
+    places = (
+        ()
+        if profile.names
+        else header_places(source, first.last, first.encoding, mark, lambda line: bool(delimiter_of(line, profile)))
+    )
+    for place in places:
         if place.line.number <= own_until:
             continue  # a header's own row of other names
         stands_again = True

@@ -40,12 +40,15 @@ class SourceRule:
         Numbers to canonical columns.
     derived : mapping of field to str
         What a user must know of a field.
+    sampled : str
+        Column with the time at which the values were true, on the clock of the messages; empty: that of the message.
     """
 
     source: str
     needs: tuple[str, ...]
     columns: Callable[[NumericColumns], Columns]
     derived: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    sampled: str = ""
 
     def told(self, topic: str) -> Iterator[Remark]:
         """Yield remarks on derived fields, one for all fields with the same text."""

@@ -16,6 +16,8 @@ from groundstation.base.records import (
     frozen,
 )
 
+MOST_LATE_NS = 1_000_000_000  # from the time at which values were true to that of their record
+
 
 @dataclass(frozen=True, eq=False)
 class TopicPart:
@@ -28,6 +30,34 @@ class TopicPart:
     time: Column
     columns: dict[str, Column]
     validity_ns: Int64Array | None = None
+
+
+def sampled_ns(time: Column, told_ns: NDArray[Any]) -> Int64Array | None:
+    """Return when values were true by what each record tells.
+
+    Where that cannot be, it is the time of the record.
+
+    Parameters
+    ----------
+    time : Column of int64
+        Time of the records, nanoseconds.
+    told_ns : ndarray, shape (n,)
+        On the same clock; zero or NaN where a device does not tell.
+
+    Returns
+    -------
+    ndarray of int64, shape (n,), or None
+        None where no record tells another time.
+
+    Examples
+    --------
+    >>> sampled_ns(Column(np.array([10, 20, 30])), np.array([9.0, 0.0, 31.0])).tolist()
+    [9, 20, 30]
+    """
+    with np.errstate(invalid="ignore"):
+        told = np.where((told_ns > 0) & (told_ns <= time.values), told_ns, 0).astype(np.int64)
+    is_told = (told > 0) & (time.values - told <= MOST_LATE_NS) & time.mask
+    return np.where(is_told, told, time.values) if (is_told & (told != time.values)).any() else None
 
 
 def occupied(part: TopicPart) -> TopicPart | None:

@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 from groundstation.base.errors import SettingsError
 from groundstation.base.signals import RAW_PREFIX, Field, field_of, is_canonical
 from groundstation.base.toml_text import toml_table, toml_text
-from groundstation.base.units import CONVERSIONS
+from groundstation.base.units import factor_to, units_of
 from groundstation.readers.layout import METHODS, Key
 from groundstation.readers.told import HPA_PER_INHG
 
@@ -100,6 +100,7 @@ class Profile:
 
     ``header_tells``: the file's own names and rows of units settle unit, north and height where they say something, and
     a column may have its unit in parentheses behind its name. ``has_second_names``: a row of other names may follow.
+    ``names`` are those of the columns of a file that has no header row.
     """
 
     name: str
@@ -113,6 +114,7 @@ class Profile:
     has_second_names: bool
     time: TimeColumns
     variation: Variation | None = None
+    names: tuple[str, ...] = ()
     columns: tuple[ColumnRule, ...] = ()
     derived: tuple[DerivedRule, ...] = ()
     constants: Mapping[str, str] = field(default_factory=dict)
@@ -195,11 +197,11 @@ class Checker:
         return topic, known
 
     def unit(self, value: Any, key: str, wanted: str) -> float:
-        units = [name for name, (base, _factor) in CONVERSIONS.items() if base == wanted and name]
-        expected = f"a unit of {wanted}: {', '.join(units)}" if wanted else "no unit"
-        if not isinstance(value, str) or value not in CONVERSIONS or CONVERSIONS[value][0] != wanted:
+        expected = f"a unit of {wanted}: {', '.join(units_of(wanted))}" if wanted else "no unit"
+        factor = factor_to(value, wanted) if isinstance(value, str) else None
+        if factor is None:
             self.fail(key, repr(value), expected)
-        return CONVERSIONS[value][1]
+        return factor
 
     def column(self, name: str, key: str, topic: str, known: Field, table: dict[str, Any]) -> ColumnRule:
         if known.kind != "double":
@@ -224,7 +226,7 @@ class _Checker(Checker):
         table = self.table(table, "", allowed, ("name", "time", "columns"))
         name = self.text(table["name"], "name")
         raw_topic = RAW_PREFIX + self.text(table.get("raw_topic", name), "raw_topic").removeprefix(RAW_PREFIX)
-        keys = ("first_line", "columns", "rows_after_header", "header_tells", "second_names")
+        keys = ("first_line", "columns", "names", "rows_after_header", "header_tells", "second_names")
         recognise = self.table(table.get("recognise", {}), "recognise", keys)
         time = self.time(table["time"])
         columns = self.columns(table["columns"])
@@ -235,6 +237,9 @@ class _Checker(Checker):
         find = {key: self.pattern(value, f"metadata.find.{key}") for key, value in find.items()}
         constants = {key: self.text(value, f"metadata.set.{key}") for key, value in constants.items()}
         known = find.keys() | constants.keys()
+        names = self.texts(recognise["names"], "recognise.names") if "names" in recognise else ()
+        if names and not {*(rule.name for rule in columns), *time.columns} <= set(names):
+            self.fail("recognise.names", ", ".join(names), "every column that the profile names")
         rows_after = self.number(recognise.get("rows_after_header", 0), "recognise.rows_after_header")
         if rows_after != int(rows_after) or not 0 <= rows_after <= 10:
             self.fail("recognise.rows_after_header", repr(rows_after), "a whole number from 0 to 10")
@@ -251,6 +256,7 @@ class _Checker(Checker):
             header_tells=self.flag(recognise.get("header_tells", False), "recognise.header_tells"),
             has_second_names=self.flag(recognise.get("second_names", False), "recognise.second_names"),
             time=time,
+            names=names,
             variation=self.variation(table["variation"]) if "variation" in table else None,
             columns=columns,
             derived=self.derivations(table.get("derived", []), columns, raw_topic),

@@ -291,8 +291,10 @@ def _of_vectors(columns: _Cells, form: Form) -> dict[str, Column]:
 def _sigmas(columns: _Cells, *axes: str) -> dict[str, Column]:
     north, east, up = (f"sd{axis}" for axis in axes)
     found = {"horizontal_sigma_m": columns.spread(north, east), "velocity_sigma_mps": columns.spread("sdvn", "sdve")}
-    if up in columns:
-        found["vertical_sigma_m"] = columns[up]
+    single = {"vertical_sigma_m": up, "position_north_sigma_m": north, "position_east_sigma_m": east}
+    single |= {f"velocity_{name}_sigma_mps": f"sdv{name[0]}" for name in ("north", "east")}
+    single["velocity_down_sigma_mps"] = "sdvu"
+    found |= {name: columns[source] for name, source in single.items() if source in columns}
     return {name: column for name, column in found.items() if column is not None}
 
 

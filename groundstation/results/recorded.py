@@ -19,6 +19,7 @@ NAMES: Mapping[str, str] = {
     "guidance": "guidance",
     "link": "ranges",
     "adf": "bearings",
+    "imu": "IMU",
 }
 MOST_NAMED = 4
 MOST_RAW = 2

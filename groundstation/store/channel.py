@@ -187,8 +187,14 @@ class TopicWriter(ChannelWriter):
         return slot_of(field, values, column.present)
 
     def _converted(self, field: WireField, values: NDArray[Any], present: BoolArray | None) -> NDArray[Any]:
-        """Convert values to the dtype of the channel's first batch, where nothing is lost by it."""
+        """Convert values to the dtype of the channel's first batch, where nothing is lost by it.
+
+        Fields that are stored in single precision are rounded.
+        """
         numbers = "biuf"
+        if self._type.is_rounded(field, values.dtype):
+            with np.errstate(over="ignore", invalid="ignore"):
+                return values.astype(field.dtype)
         if values.dtype.kind in numbers and field.dtype.kind in numbers:
             with np.errstate(invalid="ignore"):
                 converted = values.astype(field.dtype)

@@ -251,6 +251,10 @@ class GrowingType:
             self._fields[column] = field
         return self._fields[column]
 
+    def is_rounded(self, field: WireField, dtype: np.dtype[Any]) -> bool:
+        """Tell whether values are rounded to the single precision of a canonical field."""
+        return self._canonical is not None and field.dtype == np.float32 and dtype == np.float64
+
     def _canonical_field(self, column: str, dtype: np.dtype[Any]) -> WireField:
         assert self._canonical is not None
         for field in self._canonical.own_fields:

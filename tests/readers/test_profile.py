@@ -1,5 +1,6 @@
 """Profiles: every conversion, every check of a slip, derived fields with their signs."""
 
+import math
 import re
 from pathlib import Path
 
@@ -29,6 +30,7 @@ FIELD_OF_UNIT = {
     "mhz": "guidance.frequency_mhz",
     "dbhz": "gnss.cn0_dbhz",
     "s": "gnss.age_of_corrections_s",
+    "c": "imu.temperature_c",
     "": "gnss.hdop",
 }
 FACTORS = {
@@ -67,6 +69,8 @@ FACTORS = {
     "dbhz": 1.0,
     "s": 1.0,
     "ms": 1e-3,
+    "us": 1e-6,
+    "c": 1.0,
     "": 1.0,
 }
 
@@ -439,7 +443,63 @@ def test_canonical_units_are_all_convertible() -> None:
     known = {unit for unit, _factor in CONVERSIONS.values()}
     for fields in TOPICS.values():
         for field in fields:
-            assert field.kind != "double" or field.unit in known | {"s", "m2"}, field.name
+            assert field.kind != "double" or field.unit in known | {"s", "m2", "rad"}, field.name
+
+
+def test_angles_of_increments_are_read_in_radians_or_degrees(tmp_path: Path) -> None:
+    columns = "".join(
+        f'{axis} = {{ field = "imu.delta_angle_{axis}_rad", unit = "{unit}" }}\n'
+        for axis, unit in (("x", "rad"), ("y", "deg"), ("z", "semicircle"))
+    )
+    log, settings = files(tmp_path, BASIC + f"[columns]\n{columns}", "t,x,y,z\n0,0.1,1.0,0.5\n")
+    read = Read(log, settings)
+    got = [read.values("imu", f"delta_angle_{axis}_rad")[0] for axis in "xyz"]
+    assert got == pytest.approx([0.1, math.radians(1.0), math.pi / 2], rel=1e-15)
+
+
+HEADERLESS = """
+name = "imu-without-header"
+[recognise]
+names = ["ax", "gx", "ms"]
+[time]
+kind = "seconds"
+column = "ms"
+unit = "ms"
+[columns]
+"ax" = { field = "imu.accel_x_mps2", unit = "g" }
+"gx" = { field = "imu.rate_x_dps", unit = "dps", sign = -1 }
+"""
+
+
+@pytest.mark.parametrize("first", ["", "0.5,9\n", "# board 7\n", "\n"], ids=["whole", "cut", "comment", "empty"])
+def test_a_file_without_a_header_has_the_names_of_the_profile(tmp_path: Path, first: str) -> None:
+    log, settings = files(tmp_path, HEADERLESS, first + "0.1,2,10\n0.2,3,20\n0.3,nan,30\n")
+    read = Read(log, settings)
+    assert read.times("imu") == [10_000_000, 20_000_000, 30_000_000]
+    assert read.values("imu", "accel_x_mps2") == pytest.approx([0.980665, 1.96133, 2.941995], rel=1e-12)
+    assert read.values("imu", "rate_x_dps")[:2] == [-2.0, -3.0]
+
+
+def test_a_file_of_another_width_is_refused_with_the_number_of_cells(tmp_path: Path) -> None:
+    log, settings = files(tmp_path, HEADERLESS, "1,2\n3,4\n")
+    with pytest.raises(UnreadableLogError, match="rows of 3 cells"):
+        registry.identify(log, settings)
+
+
+def test_names_must_have_every_column_of_the_profile(tmp_path: Path) -> None:
+    log, settings = files(tmp_path, HEADERLESS.replace('"gx", ', ""), "1,2\n")
+    with pytest.raises(SettingsError, match=r"recognise\.names"):
+        registry.identify(log, settings)
+
+
+def test_increments_of_an_imu_need_no_profile(tmp_path: Path) -> None:
+    names = [f"delta_{what}" for what in (*(f"velocity_{a}_mps" for a in "xyz"), *(f"angle_{a}_rad" for a in "xyz"))]
+    log = tmp_path / "imu.csv"
+    head = "# start_utc: 2025-05-19T18:54:39.543049Z; VN-100, 100 Hz\n" + ",".join(["time_s", *names])
+    log.write_text(head + "\n-0.003249,1,2,3,4,5,6\n0.006758,1,2,3,4,5,7\n", encoding="utf-8")
+    read = Read(log)
+    assert [read.values("imu", name)[1] for name in names] == [1.0, 2.0, 3.0, 4.0, 5.0, 7.0]
+    assert read.times("imu") == [-3_249_000, 6_758_000]
 
 
 def test_bad_cells_are_counted_under_the_field(tmp_path: Path) -> None:

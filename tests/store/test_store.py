@@ -54,7 +54,8 @@ def values_of(dtype: str, count: int, rng: np.random.Generator) -> NDArray:
 
 def columns_of(topic: str, count: int, rng: np.random.Generator, share: float) -> dict[str, Column]:
     dtype_of = {"double": "f8", "bool": "?", "text": "U"}
-    kinds = {field.name: dtype_of[field.kind] for field in TOPICS.get(topic.partition(".")[0], ())}
+    known = TOPICS.get(topic.partition(".")[0], ())
+    kinds = {field.name: "f4" if field.is_single else dtype_of[field.kind] for field in known}
     if topic.startswith("raw."):
         kinds = {f"Column ({dtype})": dtype for dtype in RAW_DTYPES}
     out = {}
@@ -410,3 +411,15 @@ def test_text_with_odd_characters_comes_back(tmp_path: Path) -> None:
     index = np.arange(len(texts))
     batch = RecordBatch("event", index, Column(index), {"name": Column(texts)}, T0 + index)
     assert_same(joined(batches_of(written(tmp_path / "a.mcap", [batch]))["event"]), batch)
+
+
+def test_fields_of_an_inertial_unit_are_rounded_to_single_precision(tmp_path: Path) -> None:
+    index = np.arange(3)
+    given = np.array([1.0 + 1e-12, np.nan, -9.80665])
+    time_ns = T0 + index * STEP_NS
+    log = RecordBatch("imu", index, Column(index), {"accel_z_mps2": Column(given)}, time_ns)
+    later = RecordBatch(
+        "imu", index + 3, Column(index), {"accel_z_mps2": Column(given.astype("f4"))}, time_ns + STEP_NS * 3
+    )
+    found = joined(batches_of(written(tmp_path / "a.mcap", [log, later]))["imu"]).columns["accel_z_mps2"]
+    np.testing.assert_array_equal(found.values, np.tile(given.astype("f4"), 2))

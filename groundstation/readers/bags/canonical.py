@@ -13,6 +13,7 @@ import numpy as np
 from groundstation.base.records import Column
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.readers.bags.values import Values, attitude, body, level, rotated
+from groundstation.readers.imu import samples
 from groundstation.readers.layout import velocity_from_track
 from groundstation.readers.mapping import Columns, direction
 
@@ -80,6 +81,12 @@ def imu(values: Values) -> Columns:
 _IMU_PARTS = ("orientation", "angular_velocity", "linear_acceleration")
 
 
+def imu_samples(values: Values) -> Columns:
+    """Return the topic ``imu`` of an IMU message: samples, as the message tells no interval."""
+    columns = imu(values)
+    return samples({name: columns[name] for name in (*RATES, *ACCEL)})
+
+
 def _is_known(values: Values, covariance: str) -> np.ndarray | None:
     return values[covariance] != -1.0 if covariance in values else None
 
@@ -122,6 +129,7 @@ def sigmas(values: Values, present: np.ndarray) -> Columns:
         level = east + north
         is_known = present & kind.mask & of_kind
         columns = {"horizontal_sigma_m": level, "vertical_sigma_m": up}
+        columns |= {"position_north_sigma_m": north, "position_east_sigma_m": east}
         known = {name: is_known & np.isfinite(one) & (one > 0.0) for name, one in columns.items()}
     return {name: _where(np.sqrt(np.where(known[name], one, 0.0)), known[name]) for name, one in columns.items()}
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from groundstation.base.records import Remark
 from groundstation.readers.mapping import OfferedMessages, assigned
-from groundstation.readers.ulog.canonical import ROLES
+from groundstation.readers.ulog.canonical import IMU_ROLES, ROLES
 
 _PACKAGE = "px4_msgs/"
 _UPPER = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
@@ -43,6 +43,7 @@ def feed(seen: Mapping[int, Any], feeds: dict[int, list[Any]], remarks: list[Rem
         for number, one in seen.items()
         if is_px4(one.connection.type)
     ]
-    for one in assigned((role for role in ROLES if role.topic not in taken), offers):
+    of_imu = next((roles for roles in IMU_ROLES if len(list(assigned(roles, offers))) >= len(roles)), ())
+    for one in assigned((role for role in (*ROLES, *of_imu) if role.topic not in taken), offers):
         feeds.setdefault(one.offer.instance, []).append(make(one.topic, one.rule.needs, one.rule.columns))
         remarks += one.rule.told(one.topic)

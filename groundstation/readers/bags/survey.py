@@ -5,7 +5,7 @@ One of three clocks tells when values were true.
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from groundstation.base.records import Column, Remark
 from groundstation.base.signals import field_of, kind_of
 from groundstation.readers.bags import px4
 from groundstation.readers.bags.bag import Bag
-from groundstation.readers.bags.canonical import MESSAGES, is_earth_frame, wheel_odometry
+from groundstation.readers.bags.canonical import MESSAGES, imu_samples, is_earth_frame, wheel_odometry
 from groundstation.readers.bags.clocks import LARGEST_LAG_S, Lags, offsets_of, told, was_set
 from groundstation.readers.bags.decode import Decoder
 from groundstation.readers.bags.messages import ConnectionBlock
@@ -23,6 +23,7 @@ from groundstation.readers.bags.sources import in_order, sources_of
 from groundstation.readers.bags.values import Values
 from groundstation.readers.bags.work import StepBudget
 from groundstation.readers.clock_offsets import Offsets
+from groundstation.readers.imu import POINT_SAMPLES
 from groundstation.readers.mapping import Columns, mapped
 
 SHARED_SHARE = 0.8  # share of the slower topic's stamps that the faster one must have too, to be one unit
@@ -135,6 +136,7 @@ def _map(found: BagSurvey) -> None:
         for place, unit in enumerate(several, start=1):
             topic = kind if len(several) == 1 else f"{kind}.{place}"
             _feed(found, topic, unit)
+    _feed_imu(found, named)
     px4.feed({seen.connection.number: seen for seen in found.sources}, found.feeds, found.remarks, TopicFeed)
     for seen in found.sources:
         for number in seen.numbers[1:]:
@@ -251,6 +253,22 @@ def _feed(found: BagSurvey, topic: str, unit: list[SeenMessages]) -> None:
             found.remarks.append(Remark("converted", text, topic, ATTITUDE))
         elif any(name.startswith(("velocity", "rate", "accel", "field", "position")) for name in fields):
             found.remarks.append(Remark("converted", f"{topic}: {seen.connection.topic}, {_TURNED}", topic))
+
+
+def _feed_imu(found: BagSurvey, named: set[str]) -> None:
+    """Map the messages of every IMU with rates and specific force to an ``imu`` of its own."""
+    units = [seen for seen in found.sources if seen.rule is None and _serves(seen)]
+    units = [seen for seen in units if MESSAGES[seen.connection.type].role == "imu"]
+    feeds = [(seen, TopicFeed("imu", MESSAGES[seen.connection.type].needs, imu_samples)) for seen in units]
+    feeds = [(seen, feed) for seen, feed in feeds if feed.of(seen.columns)]
+    if "imu" in named:
+        return
+    feeds.sort(key=lambda one: in_order(one[0].connection))
+    for place, (seen, feed) in enumerate(feeds, start=1):
+        topic = "imu" if len(feeds) == 1 else f"imu.{place}"
+        found.feeds.setdefault(seen.connection.number, []).append(replace(feed, topic=topic))
+        text = f"{topic}: {seen.connection.topic}, {_TURNED}; {POINT_SAMPLES}"
+        found.remarks.append(Remark("converted", text, topic, tuple(feed.of(seen.columns))))
 
 
 def _choose_clock(found: BagSurvey) -> None:

@@ -15,7 +15,8 @@ from groundstation.base.ardupilot_codes import EVENTS, MODES, error_name, error_
 from groundstation.base.atmosphere import REFUSED, pressure_altitude_m
 from groundstation.base.geodesy import has_position
 from groundstation.base.log_levels import severity_of_text
-from groundstation.base.records import BoolArray, Column, Damage, RecordBatch, Remark, frozen
+from groundstation.base.records import BoolArray, Column, Damage, Int64Array, RecordBatch, Remark, frozen
+from groundstation.readers import imu
 from groundstation.readers.dataflash import rules
 from groundstation.readers.dataflash.choices import Choices
 from groundstation.readers.dataflash.overview import DataflashOverview, Unit
@@ -23,7 +24,7 @@ from groundstation.readers.dataflash.rules import FIX_2D, FIX_3D, FieldRule, Unk
 from groundstation.readers.dataflash.values import RecordRows, as_double
 from groundstation.readers.layout import velocity_from_track
 from groundstation.readers.mapping import named
-from groundstation.readers.parts import TopicPart, bounded, merged, occupied
+from groundstation.readers.parts import TopicPart, bounded, merged, occupied, sampled_ns
 from groundstation.readers.places import nowhere
 
 RANGE_GOOD, FACING_DOWN = 4, 25
@@ -52,7 +53,8 @@ class Mapper:
     def take(self, rows: RecordRows) -> None:
         """Take in the rows of one sensor; types that map to nothing are passed over."""
         for topic, columns_of in self._takers.get((rows.definition.name, rows.instance), ()):
-            part = occupied(TopicPart(rows.record_index, rows.time_ns, columns_of(topic, rows)))
+            validity_ns = self._validity_ns(topic, rows)
+            part = occupied(TopicPart(rows.record_index, rows.time_ns, columns_of(topic, rows), validity_ns))
             if part is not None and len(part.index):
                 self._parts.setdefault(topic, []).append(part)
 
@@ -103,6 +105,8 @@ class Mapper:
         }
         for unit, topic in choices.sensor_topics.items():
             add(unit, topic, by_kind[topic.partition(".")[0]])
+        for unit, topic in choices.imu_topics.items():
+            add(unit, topic, self._increments if unit[0] in rules.IMU_TYPES[0][0] else self._samples)
         add(("ATT", None), "ins", self._attitude)
         add(("AHR2", None), "ins.2", self._backup)
         add(("POS", None), "ins", self._position)
@@ -235,12 +239,44 @@ class Mapper:
         times, sigmas = self._found.sigmas.get((rows.definition.name, rows.instance), (None, {}))
         if times is None or not len(times):
             return {}
-        at = np.minimum(np.searchsorted(times, rows.time_ns.values), len(times) - 1)
-        known = (times[at] == rows.time_ns.values) & rows.time_ns.mask & has_fix
+        at, known = _same_time(times, rows)
+        known = known & has_fix
         return {
             name: Column(values[at], known if name == "velocity_sigma_mps" else known & (values[at] > 0.0))
             for name, values in sigmas.items()
         }
+
+    def _increments(self, topic: str, rows: RecordRows) -> dict[str, Column]:
+        """Return the increments of a unit, with the intervals of its gyros and accelerometers."""
+        definition = rows.definition
+        if not definition.has_numbers(*rules.INCREMENTS) or not definition.has_numbers(rules.INTERVAL):
+            return {}
+        values = [as_double(rows.values(name)) for name in rules.INCREMENTS]
+        angle_s, velocity_s = (
+            as_double(rows.values(name if definition.has_numbers(name) else rules.INTERVAL))
+            for name in (rules.ANGLE_INTERVAL, rules.VELOCITY_INTERVAL)
+        )
+        return imu.increments(values[:3], values[3:], angle_s, velocity_s)
+
+    def _samples(self, topic: str, rows: RecordRows) -> dict[str, Column]:
+        values = self._values(topic, rows, (*rules.RATES, *rules.ACCELERATIONS))
+        columns = {name: Column(column) for name, column in values.items()}
+        named = next((name for name in rules.TEMPERATURE if rows.definition.has_numbers(name)), None)
+        if named and columns:
+            temperature = as_double(rows.values(named))
+            columns["temperature_c"] = Column(temperature, temperature != 0.0)  # of a sensor without one
+        return imu.samples(columns)
+
+    def _validity_ns(self, topic: str, rows: RecordRows) -> Int64Array | None:
+        """Return when the values of records were true, where the log tells it."""
+        if topic in self._choices.imu_topics.values() and rows.definition.has_integers(rules.SAMPLED):
+            return sampled_ns(rows.time_ns, rows.values(rules.SAMPLED).astype(np.float64) * 1e3)
+        if topic.startswith("gnss"):
+            arrived = self._found.arrivals.get((rows.definition.name, rows.instance))
+            if arrived is not None:
+                at, known = _same_time(arrived[0], rows)
+                return sampled_ns(rows.time_ns, np.where(known, arrived[1][at], np.nan))
+        return None
 
     def _magnetometer(self, topic: str, rows: RecordRows) -> dict[str, Column]:
         healthy = frozen(rows.values("Health") != 0) if rows.definition.has_numbers("Health") else None
@@ -270,6 +306,14 @@ class Mapper:
     def _event(self, topic: str, rows: RecordRows) -> dict[str, Column]:
         names = event_names(rows, self._choices.vehicle)
         return {} if names is None else {"name": Column(names), "severity": Column(event_severities(rows, names))}
+
+
+def _same_time(times: Int64Array, rows: RecordRows) -> tuple[Int64Array, BoolArray]:
+    """Return the place of each row's time among some times, and whether it is there."""
+    if not len(times):
+        return np.zeros(len(rows), dtype=np.int64), np.zeros(len(rows), dtype=bool)
+    at = np.minimum(np.searchsorted(times, rows.time_ns.values), len(times) - 1)
+    return at, frozen((times[at] == rows.time_ns.values) & rows.time_ns.mask)
 
 
 def event_names(rows: RecordRows, vehicle: str) -> NDArray[np.str_] | None:

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from groundstation.base.records import Remark
+from groundstation.readers import imu
 from groundstation.readers.dataflash import rules
 from groundstation.readers.dataflash.overview import DataflashOverview, States, Unit
 from groundstation.readers.dataflash.rules import FieldRule
@@ -20,6 +21,8 @@ class Choices:
     Parameters
     ----------
     sensor_topics : mapping of sensor to topic
+    imu_topics : mapping of sensor to topic
+        Records of increments, or of samples.
     rates : tuple of sensors
         Whose angular rates and accelerations are those of ``ins``.
     ekf : str
@@ -38,6 +41,7 @@ class Choices:
     """
 
     sensor_topics: Mapping[Unit, str]
+    imu_topics: Mapping[Unit, str]
     rates: tuple[Unit, ...]
     ekf: str
     ekf_topic: str
@@ -72,6 +76,8 @@ class Choices:
             if topic.startswith("radio_altimeter"):
                 text = "distance of a downward range finder along its axis, not corrected for tilt"
                 remarks.append(Remark("derived", text, topic, ("height_m",)))
+            if topic.startswith("imu"):
+                remarks.append(self._of_imu(topic, given[topic]))
         if "discrete" in given:
             text = "state of the land detector (EV land complete, not landed), repeated at each ATT record"
             remarks.append(Remark("derived", text, "discrete", ("weight_on_wheels",)))
@@ -80,6 +86,13 @@ class Choices:
             origin = f"velocity of {self.ekf}1, the core in use" if self.ekf else "velocity of EKF1, not in use"
             remarks.append(Remark("derived", origin, self.ekf_topic, fields_of))
         return remarks
+
+    def _of_imu(self, topic: str, fields: set[str]) -> Remark:
+        """Return the remark on the source of a unit."""
+        names = " and ".join(sorted({unit[0] for unit, fed in self.imu_topics.items() if fed == topic}))
+        told = tuple(sorted(fields - {"is_integral"}))
+        what = "increments of the autopilot" if "interval_s" in fields else imu.POINT_SAMPLES
+        return Remark("derived", f"{names}: {what}", topic, told)
 
 
 def choose(found: DataflashOverview, vehicle: str) -> Choices:
@@ -90,6 +103,7 @@ def choose(found: DataflashOverview, vehicle: str) -> Choices:
     rates = next((kinds for kinds in (("IMU",), ("GYR", "ACC")) if any(kind in found.types for kind in kinds)), ())
     return Choices(
         sensor_topics=_sensor_topics(found),
+        imu_topics=_imu_topics(found),
         rates=tuple(min(units, key=_instance) for name in rates if (units := _units_of(found, name))),
         ekf=ekf,
         ekf_topic="ins.2" if is_second else "ins",
@@ -121,6 +135,26 @@ def _sensor_topics(found: DataflashOverview) -> dict[Unit, str]:
                 numbered = len(units) > 1
                 topics |= {unit: f"{kind}.{at + 1}" if numbered else kind for at, unit in enumerate(units)}
                 break
+    return topics
+
+
+def _imu_topics(found: DataflashOverview) -> dict[Unit, str]:
+    """Return the topic of each unit, from the best source that the logger did not thin out.
+
+    Gyros and accelerometers that are logged apart feed one topic, by their number.
+    """
+    counts = [max((found.counts.get(types[0], 0) for types in group), default=0) for group in rules.IMU_TYPES]
+    place = imu.first_whole(counts)
+    if place is None:
+        return {}
+    topics: dict[Unit, str] = {}
+    several = [
+        [unit for name in types for unit in sorted(_units_of(found, name), key=_instance)]
+        for types in rules.IMU_TYPES[place]
+    ]
+    most = max(map(len, several))
+    for units in several:
+        topics |= {unit: f"imu.{at}" if most > 1 else "imu" for at, unit in enumerate(units, start=1)}
     return topics
 
 

@@ -22,6 +22,7 @@ MOST_INSTANCES = 32  # more values than that tell no sensors apart
 EV_LANDED, EV_NOT_LANDED = 18, 28
 _GPS_TYPES = ("GPS", "GPS2")
 _ACCURACY_TYPES = {"GPA": "GPS", "GPA2": "GPS2"}
+_ARRIVAL, NS_PER_MS = "SMS", 1e6  # milliseconds since power-up at which the message of a fix was there
 _EKF_STATUS_TYPES = ("EKF4", "NKF4", "XKF4")
 
 Unit = tuple[str, int | None]  # type and instance: one sensor
@@ -80,11 +81,15 @@ class DataflashOverview:
         Whether any receiver had a position.
     sigmas : mapping of receiver to (times in ns, values by field)
         What the receiver says of its own errors, logged in a record of its own.
+    arrivals : mapping of receiver to (times in ns, arrivals in ns)
+        When the message of a fix came, logged beside its errors.
     primary_core : mapping of EKF status type to States
         Which of the filter's cores was in use.
     landed : States
         1 landed, 0 not, as the land detector's events say.
     damages : tuple of Damage
+    counts : mapping of str to int
+        Records of each type, of all its instances.
     """
 
     units: Units
@@ -96,9 +101,11 @@ class DataflashOverview:
     gps_times: GpsTimes
     has_fix: bool
     sigmas: Mapping[Unit, tuple[Int64Array, Mapping[str, FloatArray]]]
+    arrivals: Mapping[Unit, tuple[Int64Array, FloatArray]]
     primary_core: Mapping[str, States]
     landed: States
     damages: tuple[Damage, ...]
+    counts: Mapping[str, int]
 
 
 def overview(scanner: Scanner) -> DataflashOverview:
@@ -119,12 +126,14 @@ class _Survey:
         self._units = Units()
         self._definitions: Mapping[int, RecordDefinition] = {}  # in force in the block at hand
         self._types: dict[str, RecordDefinition] = {}
+        self._counts: dict[str, int] = {}
         self._instances: dict[tuple[int, str], set[int]] = {}
         self._parameters: dict[str, float] = {}
         self._messages: list[str] = []
         self._gps: list[tuple[Any, ...]] = []
         self._has_fix = False
         self._sigma: dict[Unit, list[tuple[Int64Array, dict[str, FloatArray]]]] = {}
+        self._arrivals: dict[Unit, list[tuple[Int64Array, FloatArray]]] = {}
         self._unknown = UnknownUnits()
         self._cores: dict[str, list[tuple[Any, Any]]] = {}
         self._landed: list[tuple[Any, Any]] = []
@@ -153,6 +162,7 @@ class _Survey:
                 self._unread[name] = (count + len(which), definition.fault)
                 continue
             self._types.setdefault(name, definition)
+            self._counts[name] = self._counts.get(name, 0) + len(which)
             instance_field = self._units.instance_field(definition)
             if name not in self._takers and instance_field is None:
                 self._instances.setdefault((definition.type_id, name), set())
@@ -180,9 +190,11 @@ class _Survey:
             gps_times=GpsTimes(*(_joined([part[n] for part in self._gps]) for n in range(4))),
             has_fix=self._has_fix,
             sigmas={unit: _sorted_pairs(parts) for unit, parts in self._sigma.items()},
+            arrivals={unit: _sorted(parts) for unit, parts in self._arrivals.items()},
             primary_core={name: _states(parts) for name, parts in self._cores.items()},
             landed=_states(self._landed),
             damages=(*scanner.spans.damages(), *self._more_damages(scanner), *self._unknown.damages()),
+            counts=self._counts,
         )
 
     def _more_damages(self, scanner: Scanner) -> list[Damage]:
@@ -253,10 +265,16 @@ class _Survey:
                 factors[rule] = factor
             elif rows.definition.has_numbers(rule.source):
                 self._unknown.add(rule, rows.definition, self._units, len(rows), "gnss")
-        if not factors:
+        has_arrivals = rows.definition.has_integers(_ARRIVAL)
+        if not factors and not has_arrivals:
             return
         for part in by_instance(rows, instance_field) if instance_field else (rows,):
             receiver = (_ACCURACY_TYPES[rows.definition.name], part.instance)
+            if has_arrivals:
+                arrived_ns = as_double(part.values(_ARRIVAL)) * NS_PER_MS
+                self._arrivals.setdefault(receiver, []).append((part.time_ns.values, arrived_ns))
+            if not factors:
+                continue
             sigmas = {rule.field: as_double(part.values(rule.source)) * factor for rule, factor in factors.items()}
             self._sigma.setdefault(receiver, []).append((part.time_ns.values, sigmas))
 
@@ -290,6 +308,12 @@ def _fixed(rows: RecordRows) -> BoolArray:
     if rows.definition.has_numbers("Lat", "Lng"):
         return has_position(rows.values("Lat"), rows.values("Lng"))
     return np.zeros(len(rows), dtype=bool)
+
+
+def _sorted(parts: list[tuple[Int64Array, FloatArray]]) -> tuple[Int64Array, FloatArray]:
+    times, values = (np.concatenate(several) for several in zip(*parts, strict=True))
+    order = np.argsort(times, kind="stable")
+    return times[order], values[order]
 
 
 def _sorted_pairs(

@@ -155,6 +155,17 @@ CURRENT = (FieldRule("Curr", "current_a", "A", integer_multiplier=0.01),)
 WIND = (FieldRule("VWN", "wind_north_mps", "m/s"), FieldRule("VWE", "wind_east_mps", "m/s"))
 HEIGHT = (FieldRule("Dist", "height_m", "m", integer_multiplier=0.01),)
 
+# Sources of `imu`, best first: the types of increments, of samples, and of samples of the gyros and the accelerometers
+# alone, each with those that older firmware logged for further units.
+IMU_TYPES: tuple[tuple[tuple[str, ...], ...], ...] = (
+    (("IMT", "IMT2", "IMT3"),),
+    (("IMU", "IMU2", "IMU3"),),
+    (("GYR", "GYR1", "GYR2", "GYR3"), ("ACC", "ACC1", "ACC2", "ACC3")),
+)
+INCREMENTS = (*(f"DelA{axis}" for axis in "XYZ"), *(f"DelV{axis}" for axis in "XYZ"))
+ANGLE_INTERVAL, VELOCITY_INTERVAL, INTERVAL = "DelaT", "DelvT", "DelT"
+SAMPLED = "SampleUS"  # of GYR and ACC: when the sample was taken
+TEMPERATURE = ("T", "Temp")
 FIX_2D, FIX_3D = 2, 3  # states of a receiver
 # 0 and 1 no receiver and no fix, 4 with SBAS or DGPS. Source: ArduPilot, libraries/AP_GPS/AP_GPS.h, GPS_Status.
 FIXES = np.array(["none", "none", "2d", "3d", "dgnss", "rtk_float", "rtk_fixed", "other"])

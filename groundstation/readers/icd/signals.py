@@ -12,7 +12,7 @@ import numpy as np
 
 from groundstation.base.angles import wrap_360
 from groundstation.base.signals import field_of, kind_of
-from groundstation.base.units import CONVERSIONS
+from groundstation.base.units import CONVERSIONS, factor_to
 from groundstation.readers.icd.model import Element, FloatArray, Transform
 
 AnyElement = TypeVar("AnyElement", bound=Element)
@@ -95,9 +95,7 @@ def canonical_factor(unit: str, signal: str) -> float | None:
     """
     wanted = unit_of(signal)
     name = UNITS.get(unit.lower().replace(" ", "").replace(".", ""))
-    if wanted is None or name is None or CONVERSIONS[name][0] != wanted:
-        return None
-    return CONVERSIONS[name][1]
+    return None if wanted is None or name is None else factor_to(name, wanted)
 
 
 def unit_of(signal: str) -> str | None:

@@ -196,6 +196,7 @@ def _quality(epochs: SentenceEpochs) -> Columns:
         both = spread["stdLat"].mask & spread["stdLong"].mask
         columns["horizontal_sigma_m"] = Column(np.hypot(spread["stdLat"].values, spread["stdLong"].values), both)
         columns["vertical_sigma_m"] = spread["stdAlt"]
+        columns |= {"position_north_sigma_m": spread["stdLat"], "position_east_sigma_m": spread["stdLong"]}
     return columns
 
 

@@ -170,6 +170,8 @@ def gnss_batch(block: MessagesByName, leader: str, tally: StreamTally) -> Record
         "altitude_ellipsoid_m": Column(height + undulation, upright),
         "horizontal_sigma_m": Column(_root(fields, "latitude_std_dev", "longitude_std_dev"), computed),
         "vertical_sigma_m": Column(fields["height_std_dev"].astype(np.float64), upright),
+        "position_north_sigma_m": Column(fields["latitude_std_dev"].astype(np.float64), computed),
+        "position_east_sigma_m": Column(fields["longitude_std_dev"].astype(np.float64), computed),
         "satellites_used": Column(fields["num_soln_svs"].astype(np.float64)),
         "integrity_ok": Column(computed, ~flat),
         "fix": Column(_FIXES[kind]),

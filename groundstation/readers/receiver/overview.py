@@ -9,6 +9,7 @@ import numpy as np
 from groundstation.base.records import Damage, Int64Array, Remark
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
+from groundstation.readers.imu import POINT_SAMPLES
 from groundstation.readers.receiver import nmea, novatel, novatel_messages, scan, ubx
 from groundstation.readers.receiver.dating import DateFacts, dated
 from groundstation.readers.receiver.host_text import HostText
@@ -26,6 +27,7 @@ from groundstation.readers.receiver.ubx_canonical import (
     POSITION_SOURCES,
     has_attitude,
 )
+from groundstation.readers.receiver.ubx_inertial import SOURCE as INERTIAL
 from groundstation.readers.source import Source
 
 NAME = "receiver"
@@ -216,6 +218,7 @@ def remarks(found: StreamOverview) -> Iterator[Remark]:
     yield from _gnss_remarks(found)
     if found.attitude:
         yield Remark("mapped", f"ins from {found.attitude}: {_ATTITUDE_SENSE[found.attitude]}", "ins", ("mode",))
+    yield from _inertial_remarks(found)
     if found.rtcm:
         numbers = ", ".join(f"{number}: {count}" for number, count in sorted(found.rtcm.items()))
         yield Remark("skipped", f"{found.rtcm.total()} frames of RTCM 3 are not read (by message {numbers})")
@@ -226,6 +229,25 @@ def remarks(found: StreamOverview) -> Iterator[Remark]:
                 "clock_disagrees",
                 f"the receiver's clock goes from {utc_ns_to_iso(first)} back to {utc_ns_to_iso(last)}",
             )
+
+
+def _inertial_remarks(found: StreamOverview) -> Iterator[Remark]:
+    """Yield remarks on what serves ``imu``, and on inertial messages that cannot."""
+    if found.counts[INERTIAL]:
+        text = "measurements along the receiver's own axes, timed by its counter"
+        yield Remark("mapped", f"imu from {INERTIAL}: {text}; {POINT_SAMPLES}", "imu")
+    for name, why in _NO_INERTIAL.items():
+        if found.counts[name]:
+            yield Remark("skipped", f"{name} ({found.counts[name]}) stays raw: {why}", f"raw.{name}")
+
+
+_WITHOUT_GRAVITY = "it is without gravity and the earth's rotation, which are no specific force and no rate"
+_COUNTS_ALONE = "counts whose scale is that of the unit, which the message does not tell"
+_NO_INERTIAL = {
+    **dict.fromkeys(("CORRIMUDATA", "CORRIMUDATAS"), _WITHOUT_GRAVITY),
+    **dict.fromkeys(("RAWIMU", "RAWIMUS", "RAWIMUX", "RAWIMUSX"), _COUNTS_ALONE),
+    "ESF-RAW": "the unit of its counter is not documented; ESF-MEAS has the same sensors",
+}
 
 
 def _gnss_remarks(found: StreamOverview) -> Iterator[Remark]:

@@ -18,6 +18,7 @@ from groundstation.readers.receiver import (
     scan,
     ubx,
     ubx_canonical,
+    ubx_inertial,
 )
 from groundstation.readers.receiver.messages import MessagesByName, bounded, raw_batches, text_batches
 from groundstation.readers.receiver.novatel_messages import INS_SOURCES
@@ -45,9 +46,9 @@ def items(source: Source) -> Iterator[Item]:
     # Messages of one epoch come late and in any order, with times some microseconds apart: no step of the clock.
     yield LogHeader(NAME, found.metadata, 0 if found.is_absolute else None, has_counting_clock=True)
     stream, tally = Stream(source, is_bare, _epoch_start_of(found), host.accepts if host else None), StreamTally()
-    days = nmea.DayTimes(found.anchors)
+    days, counter = nmea.DayTimes(found.anchors), ubx_inertial.CounterClock()
     for frames, sentences in found.blocks or ((frames, by_address(frames)) for frames in stream):
-        yield from _of_block(frames, sentences, found, days, tally)
+        yield from _of_block(frames, sentences, found, days, counter, tally)
     yield from remarks(found)
     yield from tally.items(found.counts)
     yield from found.damages if found.blocks else stream.damages()
@@ -62,7 +63,12 @@ def _epoch_start_of(found: StreamOverview) -> Callable[[Frames], int]:
 
 
 def _of_block(
-    frames: Frames, sentences: dict[str, Sentences], found: StreamOverview, days: nmea.DayTimes, tally: StreamTally
+    frames: Frames,
+    sentences: dict[str, Sentences],
+    found: StreamOverview,
+    days: nmea.DayTimes,
+    counter: ubx_inertial.CounterClock,
+    tally: StreamTally,
 ) -> Iterator[RecordBatch]:
     block = MessagesByName()
     for messages, time in ubx.timed(frames, found.anchors):
@@ -93,6 +99,9 @@ def _of_block(
     if gnss is not None:
         tally.add_fixes(gnss)
         yield from bounded(gnss)
+    inertial = ubx_inertial.imu_batch(block, counter, found.anchors)
+    if inertial is not None:
+        yield from bounded(inertial)
     ins = _ins(block, epochs, time, found, tally)
     if ins is not None:
         yield from bounded(ins)

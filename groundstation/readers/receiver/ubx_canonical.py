@@ -55,6 +55,7 @@ def gnss_batch(block: MessagesByName, leader: str, anchors: Anchors, tally: Stre
         columns = _where_a_fix_is(columns)
     if family == "NAV":
         columns |= _precise(block, fields, columns)
+        columns |= _added(block, "NAV-COV", fields, _spreads)
     columns = _added(block, f"{family}-DOP", fields, _dilution) | columns
     columns |= signals(block, family, fields)
     columns = credible_position(credible_dilution(columns), "gnss", messages.places, tally)
@@ -225,6 +226,27 @@ def _where_a_fix_is(columns: Columns) -> Columns:
     none, flat = fix.mask & (fix.values == "none"), fix.mask & (fix.values == "2d")
     refused = dict.fromkeys(columns.keys() & _MOVING, none) | dict.fromkeys(columns.keys() & _UPRIGHT, none | flat)
     return columns | {name: Column(columns[name].values, columns[name].mask & ~rows) for name, rows in refused.items()}
+
+
+def _spreads(fields: Mapping[str, NDArray[Any]]) -> Columns:
+    """Return the roots of the diagonals of NAV-COV, where the receiver calls them valid."""
+    found: Columns = {}
+    for kind, names in _COVARIANCES.items():
+        for pair, name in names.items():
+            variance = fields[f"{kind}Cov{pair}"].astype(np.float64)
+            known = (fields[f"{kind}CovValid"] != 0) & (variance > 0.0) & np.isfinite(variance)
+            found[name] = Column(np.sqrt(np.where(known, variance, 0.0)), known)
+    return found
+
+
+_COVARIANCES: Mapping[str, Mapping[str, str]] = {
+    "pos": {"NN": "position_north_sigma_m", "EE": "position_east_sigma_m"},
+    "vel": {
+        "NN": "velocity_north_sigma_mps",
+        "EE": "velocity_east_sigma_mps",
+        "DD": "velocity_down_sigma_mps",
+    },
+}
 
 
 def _dilution(fields: Mapping[str, NDArray[Any]]) -> Columns:

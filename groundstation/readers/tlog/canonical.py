@@ -13,6 +13,7 @@ import numpy as np
 from groundstation.base.geodesy import has_position
 from groundstation.base.records import BoolArray, Column
 from groundstation.base.units import DEG_PER_RAD, MPS2_PER_G, NT_PER_GAUSS
+from groundstation.readers import imu
 from groundstation.readers.layout import velocity_from_track, wind_from_direction
 from groundstation.readers.mapping import Columns, NumericColumns, Role, SourceRule, direction, named, pressure_altitude
 
@@ -21,6 +22,7 @@ ARMED, ON_GROUND = 128, 1
 _2D_FIX, _3D_FIX, _CORRECTED = 2.0, 3.0, 4.0
 # GPS_FIX_TYPE: 0 and 1 no fix, 4 DGPS or SBAS, 7 a fixed place of a base station.
 _FIXES = np.array(["none", "none", "2d", "3d", "dgnss", "rtk_float", "rtk_fixed", "other", "ppp", "other"])
+_ACCEL_BITS, _RATE_BITS, _TEMPERATURE_BIT = 0b111, 0b111000, 1 << 12  # HIGHRES_IMU_UPDATED_FLAGS
 _UNKNOWN_32 = 4_294_967_295.0
 
 
@@ -88,10 +90,23 @@ _EXTENSIONS = (
 )
 
 
-def imu(rows: NumericColumns) -> Columns:
-    """Specific force in milli-g, rates in milliradians per second."""
+def scaled_imu(rows: NumericColumns) -> Columns:
+    """Samples of specific force in milli-g and of rates in milliradians per second."""
     columns = {f"accel_{axis}_mps2": Column(rows[f"{axis}acc"] * 1e-3 * MPS2_PER_G) for axis in "xyz"}
-    return columns | {f"rate_{axis}_dps": Column(rows[f"{axis}gyro"] * 1e-3 * DEG_PER_RAD) for axis in "xyz"}
+    columns |= {f"rate_{axis}_dps": Column(rows[f"{axis}gyro"] * 1e-3 * DEG_PER_RAD) for axis in "xyz"}
+    if "temperature" in rows:  # an extension, hundredths of a degree: zero where the sender has none
+        columns["temperature_c"] = Column(rows["temperature"] * 0.01, rows["temperature"] != 0.0)
+    return imu.samples(columns)
+
+
+def precise_imu(rows: NumericColumns) -> Columns:
+    """Samples of HIGHRES_IMU, in SI units; its bits tell which values are new."""
+    told = rows["fields_updated"].astype(np.int64) if "fields_updated" in rows else np.full(len(rows["xacc"]), -1)
+    has_accel, has_rates = (told & bits == bits for bits in (_ACCEL_BITS, _RATE_BITS))
+    columns = {f"accel_{axis}_mps2": Column(rows[f"{axis}acc"], has_accel) for axis in "xyz"}
+    columns |= {f"rate_{axis}_dps": Column(rows[f"{axis}gyro"] * DEG_PER_RAD, has_rates) for axis in "xyz"}
+    columns["temperature_c"] = Column(rows["temperature"], told & _TEMPERATURE_BIT != 0)
+    return imu.samples(columns)
 
 
 def field(rows: NumericColumns) -> Columns:
@@ -131,6 +146,7 @@ _HEADING = {"true_heading_deg": "attitude of the autopilot's filter (ATTITUDE), 
 RECEIVER = "GPS"
 # Messages that are instances of one source; every other message is its own.
 INSTANCES: Mapping[str, tuple[str, int]] = MappingProxyType({"GPS_RAW_INT": (RECEIVER, 0), "GPS2_RAW": (RECEIVER, 1)})
+_INERTIAL = (*(f"{axis}acc" for axis in "xyz"), *(f"{axis}gyro" for axis in "xyz"))
 _MAG = ("xmag", "ymag", "zmag")
 _CURRENT = ("current_battery",)
 ROLES: tuple[Role, ...] = (
@@ -138,6 +154,14 @@ ROLES: tuple[Role, ...] = (
     Role("ins", (SourceRule("GLOBAL_POSITION_INT", ("lat", "lon", "alt"), global_position),)),
     Role("gnss", (SourceRule(RECEIVER, ("lat", "lon", "fix_type"), gnss, _TRACK),), has_instances=True),
     Role("magnetometer", (SourceRule("SCALED_IMU", _MAG, field), SourceRule("RAW_IMU", _MAG, field))),
+    Role(
+        "imu",
+        (
+            SourceRule("HIGHRES_IMU", (*_INERTIAL, "temperature"), precise_imu, imu.TOLD_SAMPLES),
+            SourceRule("SCALED_IMU", _INERTIAL, scaled_imu, imu.TOLD_SAMPLES),
+            SourceRule("RAW_IMU", _INERTIAL, scaled_imu, imu.TOLD_SAMPLES),
+        ),
+    ),
     Role("baro", (SourceRule("SCALED_PRESSURE", ("press_abs",), pressure, _ALTITUDE),)),
     Role("electric", (SourceRule("BATTERY_STATUS", _CURRENT, battery), SourceRule("SYS_STATUS", _CURRENT, battery))),
     Role("air", (SourceRule("WIND", ("direction", "speed"), wind),)),

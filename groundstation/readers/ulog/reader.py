@@ -25,7 +25,7 @@ from groundstation.base.records import (
 )
 from groundstation.base.signals import EVENT_SEPARATOR
 from groundstation.readers.mapping import mapped
-from groundstation.readers.parts import TopicPart, bounded, merged, occupied
+from groundstation.readers.parts import TopicPart, bounded, merged, occupied, sampled_ns
 from groundstation.readers.places import nowhere, placed
 from groundstation.readers.source import Source
 from groundstation.readers.ulog.blocks import NOT_SUBSCRIBED, MessageWalk, Topic, UlogBlock
@@ -181,9 +181,14 @@ class _CanonicalTopics:
         """Convert the data that a block has of a PX4 topic."""
         values = TopicRows(rows)
         of_topic: dict[str, dict[str, Column]] = {}
+        sampled: dict[str, Int64Array | None] = {}
         for assignment in self._found.assignments.get((topic.name, topic.instance), ()):
             if all(name in values for name in assignment.rule.needs):
                 of_topic.setdefault(assignment.topic, {}).update(assignment.rule.columns(values))
+                if assignment.rule.sampled in values:
+                    told_us = rows[assignment.rule.sampled]
+                    told_ns = np.where(told_us <= MAX_TIME_US, told_us, 0).astype(np.int64) * 1_000
+                    sampled[assignment.topic] = sampled_ns(time, told_ns)
         for name, columns in of_topic.items():
             if _WITH_MODE in columns:
                 columns["mode"] = Column(np.full(len(rows), self._mode), columns[_WITH_MODE].present)
@@ -191,7 +196,7 @@ class _CanonicalTopics:
                 self._note_refused(name, columns[_OF_PRESSURE])
             columns, zeros = placed(name, columns)
             self._losses.nowhere[name] += len(zeros)
-            part = occupied(TopicPart(index, time, columns))
+            part = occupied(TopicPart(index, time, columns, sampled.get(name)))
             if part is not None:
                 self._parts.setdefault(name, []).append(part)
         if self._found.arming and topic.instance == 0 and topic.name == self._found.arming[0]:

@@ -3,16 +3,17 @@
 The header must be known before the first batch.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Remark
-from groundstation.readers.mapping import Assignment, OfferedMessages, assigned
+from groundstation.readers.imu import first_whole
+from groundstation.readers.mapping import Assignment, OfferedMessages, Role, assigned
 from groundstation.readers.ulog.blocks import Definitions, Topic, UlogBlock
-from groundstation.readers.ulog.canonical import ARMING, ROLES
+from groundstation.readers.ulog.canonical import ARMING, IMU_ROLES, ROLES
 from groundstation.readers.ulog.messages import Keyed, keyed, release_text
 from groundstation.readers.ulog.utc import FIX_3D, UtcCollector
 
@@ -50,18 +51,20 @@ class UlogOverview:
 
 def overview(blocks: Iterable[UlogBlock], definitions: Definitions) -> UlogOverview:
     """Go through the blocks of a log once; ``definitions`` are those of their walk."""
-    with_data: set[int] = set()
+    counts: dict[int, int] = {}
     found, clocks = UlogOverview(), UtcCollector()
     for block in blocks:
-        occurring = np.flatnonzero(np.bincount(block.topic[block.topic >= 0])).tolist()
-        with_data.update(occurring)
+        messages = np.bincount(block.topic[block.topic >= 0])
+        occurring = np.flatnonzero(messages).tolist()
+        for number in occurring:
+            counts[number] = counts.get(number, 0) + int(messages[number])
         for topic in (block.topics[number] for number in occurring):
             _note_odd_flags(block, topic, found.odd_flags)
             if topic.name not in found.fixed and _has_fix(block, topic):
                 found.fixed.add(topic.name)
             clocks.take(block, topic)
         _note_facts(block, found.metadata, clocks)
-    _assign(found, [topic for topic in definitions.topics if topic.number in with_data])
+    _assign(found, [topic for topic in definitions.topics if topic.number in counts], counts)
     start = clocks.power_up(found.metadata.get("ver_sw_release", ""))
     found.utc_of_zero_ns = start.utc_ns
     found.remarks += start.remarks
@@ -88,7 +91,7 @@ def _has_fix(block: UlogBlock, topic: Topic) -> bool:
     return bool((rows["fix_type"] >= FIX_3D).any())
 
 
-def _assign(found: UlogOverview, topics: list[Topic]) -> None:
+def _assign(found: UlogOverview, topics: list[Topic], counts: Mapping[int, int]) -> None:
     """Choose the rule of each role among topics with data; of receivers those with a fix."""
     silent = _RECEIVERS - found.fixed if found.fixed else frozenset()
     offers = [
@@ -96,13 +99,33 @@ def _assign(found: UlogOverview, topics: list[Topic]) -> None:
         for topic in topics
         if topic.layout is not None and topic.name not in silent
     ]
-    for one in assigned(ROLES, offers):
+    for one in assigned((*ROLES, *_imu_roles(topics, counts)), offers):
         found.assignments.setdefault((one.offer.source, one.offer.instance), []).append(one)
         found.remarks += one.rule.told(one.topic)
     for source, column, armed in ARMING:
         if any(topic.name == source and topic.layout and column in topic.layout.names for topic in topics):
             found.arming = (source, column, armed)
             break
+
+
+def _imu_roles(topics: list[Topic], counts: Mapping[int, int]) -> tuple[Role, ...]:
+    """Return the roles of the best source of ``imu`` that the logger did not thin out."""
+    records = []
+    for roles in IMU_ROLES:
+        needed = {rule.source: rule for role in roles for rule in role.rules}
+        first = {
+            topic.name: counts[topic.number]
+            for topic in reversed(topics)
+            if topic.layout is not None
+            and any(
+                rule.source == topic.name and topic.layout.names >= set(rule.needs)
+                for role in roles
+                for rule in role.rules
+            )
+        }
+        records.append(max(first.values()) if len(first) == len(needed) else 0)
+    place = first_whole(records)
+    return () if place is None else IMU_ROLES[place]
 
 
 def _note_facts(block: UlogBlock, metadata: dict[str, str], clocks: UtcCollector) -> None:
