@@ -18,7 +18,7 @@ OPENS = {
     "gnss/walk_0827_gnss_1730_sf.pos": ("warn", "Warning", "RTK fixed 65 %", "GNSS (RTK fixed 65 %) at 4 Hz"),
     "gnss/drive_0708_gnss_1934_sf.pos": ("good", "Good", "RTK fixed 99.6 %", "9:09 min of GNSS"),
     "g1000/log_220416_161856_LFQA.csv": ("warn", "Warning", "Position jumps once", "3:12 min of GNSS, attitude"),
-    "foreign/robot_localization_jackal_test2.bag": ("plain", "Recorded", "61 s of attitude and odometry", ""),
+    "foreign/robot_localization_jackal_test2.bag": ("plain", "Recorded", "61 s of attitude, odometry and IMU", ""),
     "ch10/kc135_429_1553_1MB.c10": ("warn", "Recorded", "Messages without navigation", ""),
     "ulog/Proto_FLT09_REENCODED_fixedwing.ulg": ("bad", "Left GNSS", "INS and GNSS up to 85.1 m", "8:50 min of GNSS"),
     "ulog/pyulog_sample.ulg": ("bad", "Failed", "“no barometer found", "the recorder paused"),
