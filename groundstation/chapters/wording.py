@@ -7,6 +7,7 @@ from typing import Any, TypeGuard
 
 from groundstation.base.printable import printable
 from groundstation.base.unit_names import UNITS, split_unit
+from groundstation.base.words import clock_text
 
 ABSENT = "—"
 MINUS = "−"
@@ -121,10 +122,7 @@ def clock(seconds: Any) -> str:
     """
     if not is_number(seconds):
         return ABSENT
-    whole = round(abs(seconds))
-    hours, rest = divmod(whole, 3600)
-    tail = f"{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"
-    return (MINUS if seconds < 0 and whole else "") + (f"{hours}:{tail}" if hours else tail)
+    return (MINUS if seconds < 0 and round(abs(seconds)) else "") + clock_text(seconds)
 
 
 def typeset(text: str) -> str:

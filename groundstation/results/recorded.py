@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 
 from groundstation.base.ledger import Ledger, TopicEntry
 from groundstation.base.signals import RAW_PREFIX, is_canonical, kind_of
+from groundstation.base.words import clock_text, counted, listed
 from groundstation.results.flight import FlightResults
 from groundstation.results.roles import WordsOfRecord
 
@@ -26,6 +27,7 @@ MOST_RAW = 2
 ATTITUDE = frozenset(("roll_deg", "pitch_deg"))
 HEADINGS = frozenset(("true_heading_deg", "magnetic_heading_deg"))
 MOVES = frozenset(("latitude_deg", "velocity_north_mps", "north_m", "position_north_m"))
+HOUR_S = 3600
 FEW_S = 120.0  # below it a length is told in seconds
 GREAT_LOSS = 0.05  # share of the time of GNSS or INS, from which a loss is what a report opens with
 
@@ -50,10 +52,10 @@ def contents(results: FlightResults) -> str:
     if not kinds:
         return _raw(results)
     length = max((one.span_s for name, one in ledger.topics.items() if is_canonical(name)), default=0.0)
-    listed = ", ".join(_by_rate(kinds[:MOST_NAMED]))
+    shown = ", ".join(_by_rate(kinds[:MOST_NAMED]))
     more = len(kinds) - MOST_NAMED
     also = f", beside {more} more" if more > 0 else ""
-    return f"{_length(length)} of {listed}{also}" if length else f"{listed}{also}"
+    return f"{_length(length)} of {shown}{also}" if length else f"{shown}{also}"
 
 
 def words(results: FlightResults) -> Mapping[str, str]:
@@ -68,7 +70,7 @@ def wholeness(results: FlightResults) -> str:
     places = sum(1 for one in ledger.damages if one.loses_data and one.kind != "truncated")
     lost = (
         "its end is cut off" if ledger.truncated is not None else "",
-        _counted(places, "damaged place") if places else "",
+        counted(places, "damaged place") if places else "",
         _gaps(ledger),
         f"the recorder paused for {ledger.dropouts.total_s:.3g} s" if ledger.dropouts.count else "",
     )
@@ -105,7 +107,7 @@ def _kind(ledger: Ledger, kind: str, told: str) -> tuple[str, str] | None:
     name = NAMES[kind] if kind != "ins" else _of_ins(topics.values())
     several = f"{len(topics)} x {name}" if len(topics) > 1 else name
     rate = first.nominal_rate_hz
-    return f"{several} ({told})" if told else several, f"at {_hertz(rate)} Hz" if rate else _counted(first.rows, "row")
+    return f"{several} ({told})" if told else several, f"at {_hertz(rate)} Hz" if rate else counted(first.rows, "row")
 
 
 def _by_rate(kinds: list[tuple[str, str]]) -> list[str]:
@@ -114,7 +116,7 @@ def _by_rate(kinds: list[tuple[str, str]]) -> list[str]:
     for name, rate in kinds:
         by_rate.setdefault(rate, []).append(name)
     return [
-        f"{_listed(names)} {rate}" if rate.startswith("at ") else f"{_listed(names)} ({rate})"
+        f"{listed(names)} {rate}" if rate.startswith("at ") else f"{listed(names)} ({rate})"
         for rate, names in by_rate.items()
     ]
 
@@ -147,9 +149,9 @@ def _raw(results: FlightResults) -> str:
         return "no signals"
     named = [f"{name.removeprefix(RAW_PREFIX)} ({one.rows})" for name, one in topics[:MOST_RAW]]
     more = len(topics) - len(named)
-    listed = _listed([*named, _counted(more, "more kind")] if more > 0 else named)
+    shown = listed([*named, counted(more, "more kind")] if more > 0 else named)
     length = f"{_length(results.duration_s)} of " if results.duration_s else ""
-    return f"{length}messages without navigation: {listed}"
+    return f"{length}messages without navigation: {shown}"
 
 
 def _gaps(ledger: Ledger) -> str:
@@ -178,13 +180,4 @@ def _length(seconds: float) -> str:
     """Return a length of time for people: "26 s", "2:14 min", "1:05:10 h"."""
     if seconds < FEW_S:
         return f"{seconds:.0f} s" if seconds >= 10.0 else f"{seconds:.2g} s"
-    hours, rest = divmod(round(seconds), 3600)
-    return f"{hours}:{rest // 60:02d}:{rest % 60:02d} h" if hours else f"{rest // 60}:{rest % 60:02d} min"
-
-
-def _counted(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"
-
-
-def _listed(parts: list[str]) -> str:
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+    return f"{clock_text(seconds)} {'h' if round(seconds) >= HOUR_S else 'min'}"

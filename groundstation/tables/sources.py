@@ -12,6 +12,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import HEADING_IS_TRACK
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
+from groundstation.base.words import never_a_fix
 from groundstation.tables.gaps import seconds_covered
 from groundstation.tables.table import Flight, Table
 
@@ -21,7 +22,6 @@ FASTEST_HZ = 10.0  # a faster source says no more of a motion
 SURER = 1.5  # times: a smaller difference of the stated sigma is none
 NEEDS = {"gnss": ("velocity_north_mps", "velocity_east_mps"), "ins": ("roll_deg", "pitch_deg")}
 FIX_FIELDS = ("latitude_deg", "velocity_north_mps", "ground_speed_mps")  # a receiver with a fix logs one of them
-NEVER_A_FIX = "GNSS never had a fix"
 LONGEST_STEP_S = 10.0  # between samples for a source to count as there
 UNAIDED, AIDED, UNKNOWN = "unaided", "gnss_aided", "unknown"  # kinds of INS
 STATED = (UNAIDED, AIDED)  # kinds that an aircraft file or the head of a log may state
@@ -188,12 +188,7 @@ def why_without_gnss(flight: Flight, what: str) -> str:
         return f"no GNSS {what} in the log"
     used = [table.values("satellites_used") for table in told if table.has("satellites_used")]
     most = max((float(np.nanmax(values)) for values in used), default=np.nan)
-    satellites = "" if np.isnan(most) else f", {'at most ' if most else ''}{_counted(most, 'satellite')}"
-    return f"{NEVER_A_FIX}: {_counted(sum(len(table) for table in tables), 'row')}{satellites}"
-
-
-def _counted(number: float, noun: str) -> str:
-    return f"{number:g} {noun}" + ("" if number == 1 else "s")
+    return never_a_fix(sum(len(table) for table in tables), None if np.isnan(most) else most)
 
 
 def ranked(flight: Flight, kind: str) -> list[Ranked]:

@@ -2,10 +2,10 @@
 
 from collections.abc import Iterable
 
+from groundstation.base.words import never_a_fix
 from groundstation.systems.gnss.answer import STATE_NAMES, WITHOUT_FIX, WITHOUT_RECORD, GnssReceiver, StandstillScatter
 
 FIXED = frozenset(STATE_NAMES) - {*WITHOUT_FIX, *WITHOUT_RECORD}
-NEVER_A_FIX = "GNSS never had a fix"
 WHOLE = 0.9995  # share that is all
 STEP_TOLD = 0.5  # of the scatter: a coarser step of the logged places is told
 FEW = 4  # states that the sentence names
@@ -15,8 +15,7 @@ CENTIMETRES_BELOW_M = 0.995
 def never_had(one: GnssReceiver) -> str:
     """Return the sentence of a receiver that never had a fix."""
     most = one.satellites_tracked if one.satellites_used is None else one.satellites_used
-    satellites = "" if most is None else f", {'at most ' if most else ''}{most:.0f} satellite{'s' * (most != 1)}"
-    return f"{NEVER_A_FIX}: {one.rows} row{'s' * (one.rows != 1)}{satellites}"
+    return never_a_fix(one.rows, most)
 
 
 def sentence_of(one: GnssReceiver) -> str:

@@ -94,12 +94,13 @@ def _levels(table: Table, field: str) -> list[int | str | None]:
     return [int(one) if np.isfinite(one) else None for one in table.values(field).tolist()]
 
 
-def events(flight: Flight) -> Iterator[Event]:
-    """Yield text, codes and changes of mode as events of the checks they concern."""
-    yield from texts(flight)
-    yield from _errors(flight)
-    yield from _plain_events(flight)
-    yield from _modes(flight)
+def events(flight: Flight) -> tuple[Event, ...]:
+    """Return text, codes and changes of mode as events of checks, read once a flight."""
+    return flight.once("events of the autopilot's messages", _events)
+
+
+def _events(flight: Flight) -> tuple[Event, ...]:
+    return (*texts(flight), *_errors(flight), *_plain_events(flight), *_modes(flight))
 
 
 def texts(flight: Flight) -> Iterator[Event]:

@@ -6,6 +6,7 @@ GNSS good, filter healthy, vibration high 12:03-12:09.
 import re
 from collections.abc import Mapping, Sequence
 
+from groundstation.base.words import clock_text, listed
 from groundstation.systems.health.answer import FIRST, Check
 
 MOST_BAD = 4
@@ -83,13 +84,9 @@ def told(checks: Sequence[Check]) -> str:
         parts.append(f"and {len(bad) - MOST_BAD} more")
     good = [_part(one) for one in first if one.verdict == "pass"]
     absent = [NAMES[one.key] for one in first if one.verdict == "not_logged"]
-    unknown = [f"{_listed(absent)} not logged"] if absent else []
+    unknown = [f"{listed(absent)} not logged"] if absent else []
     shown = "; ".join(", ".join(filter(None, group)) for group in (parts, [*good, *unknown]) if any(group))
     return shown[:1].upper() + shown[1:]
-
-
-def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _gravity(check: Check) -> bool:
@@ -130,24 +127,11 @@ def when(check: Check) -> str:
     """Return the worst span or the first event of a check: `` 12:03-12:09``."""
     measure = check.decisive
     if check.first_event_s is not None:
-        return f" at {clock(check.first_event_s)}"
+        return f" at {clock_text(check.first_event_s)}"
     if measure is None or measure.span_start_s is None or measure.span_end_s is None:
         return ""
     share = measure.red_share if check.verdict == "fail" and measure.red_share else measure.amber_share
     if share is not None and share > MOSTLY:
         return " throughout"
-    start, end = clock(measure.span_start_s), clock(measure.span_end_s)
+    start, end = clock_text(measure.span_start_s), clock_text(measure.span_end_s)
     return f" at {start}" if start == end else f" {start}-{end}"
-
-
-def clock(seconds: float) -> str:
-    """Return flight time as minutes and seconds.
-
-    Examples
-    --------
-    >>> clock(723.4), clock(3725.0)
-    ('12:03', '1:02:05')
-    """
-    hours, rest = divmod(round(max(seconds, 0.0)), 3600)
-    tail = f"{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"
-    return f"{hours}:{tail}" if hours else tail

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
+from groundstation.base.words import listed
 from groundstation.chapters.parts import Note
 from groundstation.chapters.wording import is_number, number, percent, typeset
 from groundstation.results.forecast_methods import FORECAST_METHODS
@@ -138,16 +139,6 @@ def _at(verb: str, leads: Sequence[float], pairs: Mapping[float, tuple[float, fl
 def _where(some: Sequence[float], every: Sequence[float]) -> str:
     if not some:
         return "at no horizon"
-    return "at every horizon" if len(some) == len(every) else f"at {listed(some)} min"
-
-
-def listed(values: Sequence[float]) -> str:
-    """Return numbers in a row of words.
-
-    Examples
-    --------
-    >>> listed([30.0, 60.0, 90.0]), listed([1.0])
-    ('30, 60 and 90', '1')
-    """
-    texts = [f"{value:g}" for value in sorted(values)]
-    return texts[0] if len(texts) == 1 else ", ".join(texts[:-1]) + f" and {texts[-1]}"
+    return (
+        "at every horizon" if len(some) == len(every) else f"at {listed([f'{value:g}' for value in sorted(some)])} min"
+    )

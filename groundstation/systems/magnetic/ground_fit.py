@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180, wrap_360
+from groundstation.base.words import listed
 from groundstation.methods import harmonics
 from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.ground_answer import AlongAxis, GroundCoefficient, GroundRun, Repeat
@@ -92,16 +93,10 @@ def coefficients_of(
             continue
         others = [LETTERS[k] for k in range(len(LETTERS)) if k != place and abs(correlation[place, k]) > TANGLED]
         cause = (
-            f"not separable from {_listed(others)} by these directions"
-            if others
-            else "no runs on headings that show it"
+            f"not separable from {listed(others)} by these directions" if others else "no runs on headings that show it"
         )
         rows.append(GroundCoefficient(letter, None, float(sigma[place]), "not observable", cause))
     return tuple(rows)
-
-
-def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def with_declination(covariance: FloatArray, declination_sigma_deg: float) -> FloatArray:
