@@ -1,0 +1,1 @@
+"""Best trajectory of a log: raw inertial data and GNSS, smoothed, with sigmas that hold."""
