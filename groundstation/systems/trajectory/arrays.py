@@ -59,8 +59,8 @@ class TrajectoryOnboard(
 ):
     """Errors of the on-board filter, constant offsets taken off.
 
-    They are its output minus the smoothed solution, whose sigmas stand beside them. NaN throughout: the filter does not log it. Places are those that the
-    filter logged.
+    They are its output minus the smoothed solution, whose sigmas stand beside them. NaN throughout: the filter does not
+    log it. Places are those that the filter logged.
     """
 
     time_s: Floats
