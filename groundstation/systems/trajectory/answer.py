@@ -14,7 +14,7 @@ NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not o
 TrajectoryState = Literal["accepted", "doubtful", "ambiguous"]
 MountingSource = Literal["stated", "logged", "found", "case"]
 OutageTruth = Literal["undisturbed solution", "RTK"]
-OffsetCause = Literal["", "mounting", "antenna", "height datum"]
+OffsetCause = Literal["", "mounting", "antenna", "datum"]
 Quantity = Literal[
     "heading",
     "roll",
@@ -35,6 +35,29 @@ UNITS: Mapping[Quantity, str] = MappingProxyType(
         "vertical position": "m",
         "horizontal velocity": "m/s",
         "vertical velocity": "m/s",
+    }
+)
+# Least error of the on-board filter that is one, however small our sigma; and that a report opens with.
+LEAST_ERROR: Mapping[Quantity, float] = MappingProxyType(
+    {
+        "heading": 0.3,
+        "roll": 0.2,
+        "pitch": 0.2,
+        "horizontal position": 1.0,
+        "vertical position": 2.0,
+        "horizontal velocity": 0.2,
+        "vertical velocity": 0.2,
+    }
+)
+OPENING_ERROR: Mapping[Quantity, float] = MappingProxyType(
+    {
+        "heading": 1.5,
+        "roll": 1.0,
+        "pitch": 1.0,
+        "horizontal position": 5.0,
+        "vertical position": 10.0,
+        "horizontal velocity": 1.0,
+        "vertical velocity": 1.0,
     }
 )
 
@@ -273,10 +296,20 @@ class OnboardError:
 
 @dataclass(frozen=True)
 class OnboardErrors:
-    """Errors of the on-board filter of one topic, by quantity."""
+    """Errors of the on-board filter of one topic, by quantity.
+
+    Parameters
+    ----------
+    topic : str
+    rows : tuple of OnboardError
+    delay_s, delay_sigma_s : float or None
+        How much later than the inertial unit its stamps are, taken off; None where the motion does not tell.
+    """
 
     topic: str
     rows: tuple[OnboardError, ...]
+    delay_s: float | None = None
+    delay_sigma_s: float | None = None
 
     def row(self, quantity: Quantity) -> OnboardError | None:
         """Return the row of a quantity, None where the filter does not log it."""
