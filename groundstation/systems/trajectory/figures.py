@@ -94,7 +94,8 @@ def separation_of(
 ) -> tuple[tuple[SeparationRow, ...], TrajectorySeparation]:
     """Return forward filter minus smoothed solution: rows and columns.
 
-    Rows have RMS and worst of each quantity. The forward filter is taken from its own times; they need not be those of the smoothed solution.
+    Rows have RMS and worst of each quantity. The forward filter is taken from its own times; they need not be those of
+    the smoothed solution.
     """
     rows = rows_shown(forward.time_s)
     time_s = forward.time_s[rows]

@@ -59,9 +59,9 @@ class OnboardComparison:
 
 @dataclass(frozen=True)
 class _Output:
-    """Output of the filter, NaN where not logged; roll, pitch, heading and velocity are (n, 3).
+    """Output of the filter, NaN where not logged.
 
-    ``plane_m`` is north and east of an origin that is not logged, where there is no latitude.
+    Roll, pitch, heading and velocity have shape (n, 3). ``plane_m`` is north and east of an origin that is not logged, where there is no latitude.
     """
 
     time_s: FloatArray

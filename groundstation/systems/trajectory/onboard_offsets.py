@@ -1,4 +1,4 @@
-"""Constant offsets of an on-board filter with their sigmas: turn of its axes, place, delay.
+"""Constant offsets of an on-board filter with their sigmas: turn, place, delay.
 
 All are found robustly: a filter that went wrong for a third of the log moves none of them.
 """
