@@ -12,7 +12,13 @@ from groundstation.base.compile import in_place
 from groundstation.base.geodesy import ECCENTRICITY_SQUARED, SEMI_MAJOR_M
 from groundstation.base.records import Int64Array
 from groundstation.methods.kalman.arrays import Pattern
-from groundstation.methods.kalman.kernels import correct_states, predict_covariance, predicted, update_covariance
+from groundstation.methods.kalman.kernels import (
+    correct_states,
+    predict_covariance,
+    predict_states,
+    predicted,
+    update_covariance,
+)
 from groundstation.systems.trajectory.observe import NO_ROW, observe
 from groundstation.systems.trajectory.states import (
     BA,
@@ -27,6 +33,7 @@ from groundstation.systems.trajectory.states import (
     Gate,
     Imu,
     Kept,
+    Line,
     Noise,
     Now,
     Room,
@@ -78,6 +85,7 @@ def carry(first: int, last: int, imu: Imu, noise: Noise, pattern: Pattern, now: 
         value[i] *= F[0, BLOCK + i - SLOW]
     value[BARO] *= F[0, BLOCK + 6]
     predict_covariance(room.states, pattern, F, 0, p, room.w)
+    predict_states(room.states, pattern, F, 0, room.x, room.w)
     density = noise.density
     for i in range(3):
         q = density[1] * total + velocity
@@ -157,24 +165,51 @@ def update(m: int, scalar: int, seen: Seen, gate: Gate, held: Int64Array, now: N
 
 
 @in_place
-def close(now: Now, room: Room) -> None:
-    """Put the corrections of an epoch into the estimate."""
-    nav, value, x = now.nav, now.value, room.x
+def close(e: int, line: Line, now: Now, room: Room, kept: Kept) -> None:
+    """Put the corrections of an epoch into the estimate, or bring it back to the line of linearisation."""
+    nav, value, x, by = now.nav, now.value, room.x, room.g
     sine = math.sin(nav[0])
     root = 1.0 - ECCENTRICITY_SQUARED * sine * sine
     east = SEMI_MAJOR_M / math.sqrt(root)
     north = east * (1.0 - ECCENTRICITY_SQUARED) / root
-    nav[0] += x[0, 0] / (north + nav[2])
-    nav[1] += x[0, 1] / ((east + nav[2]) * math.cos(nav[0]))
-    nav[2] -= x[0, 2]
-    nav[3] += x[0, 3]
-    nav[4] += x[0, 4]
-    nav[5] += x[0, 5]
-    turn_before(nav, x[0, 6], x[0, 7], x[0, 8])
-    for i in range(NAVIGATION, STATES):
-        value[i] += x[0, i]
+    if line.nav.shape[0] == 0:
+        for i in range(STATES):
+            by[i] = x[0, i]
+        nav[0] += by[0] / (north + nav[2])
+        nav[1] += by[1] / ((east + nav[2]) * math.cos(nav[0]))
+        nav[2] -= by[2]
+        nav[3] += by[3]
+        nav[4] += by[4]
+        nav[5] += by[5]
+        turn_before(nav, by[6], by[7], by[8])
+        for i in range(NAVIGATION, STATES):
+            value[i] += by[i]
+    else:
+        wanted = line.nav[e]
+        by[0] = (wanted[0] - nav[0]) * (north + nav[2])
+        by[1] = (wanted[1] - nav[1]) * (east + nav[2]) * math.cos(nav[0])
+        by[2] = nav[2] - wanted[2]
+        by[3] = wanted[3] - nav[3]
+        by[4] = wanted[4] - nav[4]
+        by[5] = wanted[5] - nav[5]
+        # the turn from the estimate to the line: quaternion of the line times the inverse of the estimate's
+        a, b, c, d = wanted[6], wanted[7], wanted[8], wanted[9]
+        p, q, r, s = nav[6], -nav[7], -nav[8], -nav[9]
+        w = a * p - b * q - c * r - d * s
+        sign = 2.0 if w >= 0.0 else -2.0
+        by[6] = sign * (a * q + b * p + c * s - d * r)
+        by[7] = sign * (a * r - b * s + c * p + d * q)
+        by[8] = sign * (a * s + b * r - c * q + d * p)
+        for i in range(10):
+            nav[i] = wanted[i]
+        for i in range(NAVIGATION, STATES):
+            by[i] = line.value[e, i] - value[i]
+            value[i] = line.value[e, i]
+    keeps = kept.closed.shape[0] > 0
     for i in range(STATES):
-        x[0, i] = 0.0
+        x[0, i] -= by[i]
+        if keeps:
+            kept.closed[e, i] = by[i]
 
 
 @in_place
@@ -186,6 +221,7 @@ def run_forward(
     gate: Gate,
     pattern: Pattern,
     held: Int64Array,
+    line: Line,
     begin: int,
     end: int,
     now: Now,
@@ -194,7 +230,9 @@ def run_forward(
 ) -> float:
     """Filter epochs ``begin`` to ``end`` (not included); return the logarithm of the likelihood.
 
-    ``held``: states that are considered and not estimated.
+    ``room.x`` is where the prior lies from the estimate at the first epoch; behind each epoch it is zero, or where the
+    filter lies from ``line``. ``held``: states that
+    are considered and not estimated.
     """
     likelihood = 0.0
     for e in range(begin, end):
@@ -205,16 +243,15 @@ def run_forward(
             for i in range(KEPT_ROWS):
                 for j in range(STATES):
                     kept.p[e, i, j] = now.p[i, j]
-        if kept.value.shape[0] > 0:
+        if kept.before.shape[0] > 0:
             for j in range(STATES):
                 kept.value[e, j] = now.value[j]
-        for i in range(STATES):
-            room.x[0, i] = 0.0
+                kept.before[e, j] = room.x[0, j]
         for m in range(schedule.seen[e], schedule.seen[e + 1]):
             likelihood += update(m, 3 * m, seen, gate, held, now, room, kept)
         if kept.after.shape[0] > 0:
             for j in range(STATES):
                 kept.after[e, j] = room.x[0, j]
                 kept.variance[e, j] = now.p[j, j]
-        close(now, room)
+        close(e, line, now, room, kept)
     return likelihood

@@ -13,10 +13,12 @@ from groundstation.systems.trajectory.states import (
     LAG,
     LAT,
     LEV,
+    MA,
     MG,
     MNT,
     NO_SLIP,
     POSITION,
+    SA,
     SG,
     SLOW,
     STATES,
@@ -52,6 +54,8 @@ class Model:
         Their correlation times.
     slip_mps : float
         Sigma of the sideways and upward velocity of what rolls.
+    jitter_s : float
+        Sigma of the stamps of GNSS against those of the unit.
     """
 
     gyro_noise_deg_rth: float = 0.6
@@ -68,6 +72,7 @@ class Model:
     slow_s: float = 300.0
     fast_s: float = 10.0
     slip_mps: float = 0.1
+    jitter_s: float = 0.003
 
     def noise(self, sigma_m: FloatArray) -> Noise:
         """Return the numbers as the loops take them; ``sigma_m`` (3,) is the median of the stated sigmas."""
@@ -95,7 +100,7 @@ class Model:
             (NO_SLIP, self.slip_mps, 0.0),
         ):
             of = seen.kind == kind
-            variance[of] = variance[of] * scale**2 + floor**2
+            variance[of] = variance[of] * scale**2 + floor**2 + (seen.change[of] * self.jitter_s) ** 2
         return replace(seen, variance=variance)
 
     def changed(self, factors: dict[str, float]) -> "Model":
@@ -109,8 +114,10 @@ class StartSigmas:
 
     gyro_bias_dps: float = 1.0
     accel_bias_mg: float = 50.0
-    gyro_scale: float = 0.01
-    misalignment_deg: float = 0.5
+    gyro_scale: float = 0.005
+    misalignment_deg: float = 0.3
+    accel_scale: float = 0.005
+    accel_misalignment_deg: float = 0.2
     lever_m: float = 1.0
     latency_s: float = 0.2
     lag_s: float = 0.1
@@ -123,6 +130,8 @@ class StartSigmas:
         v[BA : BA + 3] = (self.accel_bias_mg * 1e-3 * STANDARD_GRAVITY_MPS2) ** 2
         v[SG : SG + 3] = self.gyro_scale**2
         v[MG : MG + 6] = (self.misalignment_deg * DEG) ** 2
+        v[SA : SA + 3] = self.accel_scale**2
+        v[MA : MA + 6] = (self.accel_misalignment_deg * DEG) ** 2
         v[LEV : LEV + 3] = self.lever_m**2
         v[LAT] = self.latency_s**2 if has_latency else 0.0
         v[LAG] = self.lag_s**2 if has_latency else 0.0

@@ -26,6 +26,8 @@ class Observations:
         NaN: absent.
     is_gnss : ndarray of bool, shape (m,)
         True where the latency of GNSS shifts it.
+    change : ndarray, shape (m, 3)
+        Rate of the value, by which an error of its time makes an error of it: m/s, m/s2; 0 where there is none.
     """
 
     time_s: FloatArray
@@ -33,6 +35,7 @@ class Observations:
     value: FloatArray
     variance: FloatArray
     is_gnss: BoolArray
+    change: FloatArray
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -56,6 +59,7 @@ def joined(parts: list[Observations]) -> Observations:
 def of_gnss(gnss: GnssFixes) -> Observations:
     """Return positions and velocities with the variances that the receiver states."""
     position = np.stack([np.radians(gnss.latitude_deg), np.radians(gnss.longitude_deg), gnss.height_m], axis=1)
+    velocity = np.nan_to_num(gnss.velocity_mps)
     kinds = np.repeat([POSITION, VELOCITY], len(gnss))
     everywhere = np.ones(2 * len(gnss), dtype=bool)
     found = Observations(
@@ -64,5 +68,11 @@ def of_gnss(gnss: GnssFixes) -> Observations:
         np.concatenate([position, gnss.velocity_mps]),
         np.concatenate([gnss.position_sigma_m**2, gnss.velocity_sigma_mps**2]),
         everywhere,
+        np.concatenate([velocity, _slope(gnss.time_s, velocity)]),
     )
     return found.take(np.isfinite(found.value).any(axis=1))
+
+
+def _slope(time_s: FloatArray, values: FloatArray) -> FloatArray:
+    """Return the rate of change of columns over time, 0 for a single row."""
+    return np.asarray(np.gradient(values, time_s, axis=0)) if len(time_s) > 1 else np.zeros_like(values)

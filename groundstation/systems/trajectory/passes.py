@@ -13,14 +13,19 @@ from groundstation.systems.trajectory.observations import Observations
 from groundstation.systems.trajectory.states import (
     KEPT_ROWS,
     KINDS,
+    LAT,
+    LEV,
+    MNT,
     NAVIGATION,
     STATES,
     VELOCITY,
     WIDTH,
     FloatArray,
+    BARO,
     Gate,
     Imu,
     Kept,
+    Line,
     Noise,
     Now,
     Room,
@@ -157,7 +162,7 @@ def make_room(prior: FloatArray | None = None) -> Room:
     return Room(
         np.arange(STATES),
         np.zeros((3, 3)),
-        np.zeros((9, 24)),
+        np.zeros((9, LEV)),
         np.zeros((1, ENTRIES)),
         np.zeros((STATES, STATES)),
         np.zeros(STATES),
@@ -177,9 +182,7 @@ def nothing_kept() -> Kept:
         np.zeros((0, 10)),
         np.zeros((0, ENTRIES)),
         np.zeros((0, KEPT_ROWS, STATES)),
-        wide,
-        wide,
-        wide,
+        *(wide for _ in range(5)),
         np.zeros((0, WIDTH), dtype=np.int64),
         np.zeros((0, WIDTH)),
         wide,
@@ -196,7 +199,7 @@ def all_kept(samples: int, epochs: int, seen: int) -> Kept:
         np.empty((samples, 10)),
         np.empty((epochs, ENTRIES)),
         np.empty((epochs, KEPT_ROWS, STATES)),
-        *(np.empty((epochs, STATES)) for _ in range(3)),
+        *(np.empty((epochs, STATES)) for _ in range(5)),
         np.zeros((scalars, WIDTH), dtype=np.int64),
         np.zeros((scalars, WIDTH)),
         np.zeros((scalars, STATES)),
@@ -206,6 +209,7 @@ def all_kept(samples: int, epochs: int, seen: int) -> Kept:
     )
 
 
+OWN_ESTIMATE = Line(np.zeros((0, 10)), np.zeros((0, STATES)))
 NOTHING_HELD = np.zeros(0, dtype=np.int64)
 
 
@@ -217,6 +221,8 @@ class Pass:
     ----------
     x, variance : ndarrays, shape (e, KEPT_ROWS)
         Smoothed correction to the estimate before the measurements of each epoch, and its variance.
+    constants : ndarray, shape (STATES,)
+        Values of the constants at the end; smoothed they are the same at all times.
     start : Start
         Start that the data say: estimate smoothed, covariance and prior those of the pass.
     """
@@ -227,19 +233,20 @@ class Pass:
     likelihood: float
     x: FloatArray
     variance: FloatArray
+    constants: FloatArray
     start: Start
 
 
 PATTERN = transition_pattern()
 
 
-def run_pass(samples: Samples, plan: Plan, noise: Noise, gate: Gate, start: Start) -> Pass:
+def run_pass(samples: Samples, plan: Plan, noise: Noise, gate: Gate, start: Start, line: Line = OWN_ESTIMATE) -> Pass:
     """Filter forward over all epochs and smooth back."""
     epochs = len(plan.epoch_s)
     kept = all_kept(len(samples.time_s), epochs, len(plan.seen.kind))
     now, room = start.now(), make_room(start.prior)
     likelihood = run_forward(
-        samples.imu, plan.schedule, plan.seen, noise, gate, PATTERN, NOTHING_HELD, 0, epochs, now, room, kept
+        samples.imu, plan.schedule, plan.seen, noise, gate, PATTERN, NOTHING_HELD, line, 0, epochs, now, room, kept
     )
     x, variance = np.zeros((epochs, KEPT_ROWS)), np.zeros((epochs, KEPT_ROWS))
     first = np.zeros(STATES)
@@ -258,8 +265,40 @@ def run_pass(samples: Samples, plan: Plan, noise: Noise, gate: Gate, start: Star
         first,
         start.p,
     )
-    x[0] += start.prior[:KEPT_ROWS]
-    return Pass(plan, kept, now, likelihood, x, variance, moved(start, first + start.prior))
+    x += kept.before[:, :KEPT_ROWS]
+    constants = now.value + room.x[0]
+    return Pass(plan, kept, now, likelihood, x, variance, constants, moved(start, first + start.prior))
+
+
+def line_of(one: Pass) -> Line:
+    """Return the smoothed trajectory of a pass, for the next to be linearised about.
+
+    Errors of GNSS and its latency are seen in straight lines: they stay at zero.
+    """
+    last = one.plan.schedule.first[1:] - 1
+    begin = one.start
+    nav = np.array(one.kept.nav[np.maximum(last, 0)])
+    nav[0] = begin.nav
+    correction = np.array(one.x[:, :NAVIGATION])
+    correction[0] = 0.0
+    north, east = curvature_radii_m(np.degrees(nav[:, 0]))
+    nav[:, 0] += correction[:, 0] / (north + nav[:, 2])
+    nav[:, 1] += correction[:, 1] / ((east + nav[:, 2]) * np.cos(nav[:, 0]))
+    nav[:, 2] -= correction[:, 2]
+    nav[:, 3:6] += correction[:, 3:6]
+    nav[:, 6:] = turned(nav[:, 6:], correction[:, 6:9])
+    value = np.tile(one.constants, (len(nav), 1))
+    value[:, NAVIGATION:KEPT_ROWS] = one.kept.value[:, NAVIGATION:KEPT_ROWS] + one.x[:, NAVIGATION:]
+    for first, end in ((LAT, MNT), (BARO, STATES)):
+        value[:, first:end] = 0.0
+    return Line(np.ascontiguousarray(nav), np.ascontiguousarray(value))
+
+
+def at_line(start: Start, line: Line) -> Start:
+    """Return a start on a line; the prior of the constants stays where it was, that of navigation comes along."""
+    prior = start.value + start.prior - line.value[0]
+    prior[:NAVIGATION] = 0.0
+    return Start(line.nav[0].copy(), line.value[0].copy(), start.p, prior)
 
 
 def moved(start: Start, correction: FloatArray) -> Start:

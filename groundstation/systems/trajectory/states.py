@@ -12,6 +12,7 @@ ATT       3       attitude: rotation vector in north, east, down, ``C = exp(phi 
 BG, BA    3, 3    biases of gyro (rad/s) and accelerometer (m/s2) along the axes of the unit
 SG        3       scale factor of the gyro, no unit
 MG        6       misalignment of the gyro, rad: (x, y), (x, z), (y, x), (y, z), (z, x), (z, y) of (reads, turned)
+SA, MA    3, 6    scale factor and misalignment of the accelerometer, in the same order
 LEV       3       antenna from the unit, along its axes, m
 LAT       1       latency: GNSS valid so much earlier than stamped, beyond what the stamps are shifted by, s
 LAG       1       velocity of GNSS valid so much earlier than its position, beyond what the stamps are shifted by, s
@@ -33,9 +34,9 @@ from groundstation.methods.kalman.arrays import Pattern
 FloatArray = NDArray[np.float64]
 Marks = NDArray[np.int8]
 
-POS, VEL, ATT, BG, BA, SG, MG, LEV, LAT, LAG = 0, 3, 6, 9, 12, 15, 18, 24, 27, 28
-SLOW, FAST, MNT, BARO = 29, 32, 35, 37
-STATES = 38
+POS, VEL, ATT, BG, BA, SG, MG, SA, MA = 0, 3, 6, 9, 12, 15, 18, 24, 27
+LEV, LAT, LAG, SLOW, FAST, MNT, BARO = 33, 36, 37, 38, 41, 44, 46
+STATES = 47
 NAVIGATION = 9  # the first states: position, velocity, attitude
 KEPT_ROWS = 15  # rows of the covariance that the smoother needs: navigation and biases
 MISALIGNED = ((0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1))  # axis that reads, axis that turned
@@ -49,7 +50,7 @@ WIDTH = 10  # most states that one scalar measurement sees
 def transition_pattern() -> Pattern:
     """Return the pattern of the transition of one epoch.
 
-    Rows of navigation are a full block over states 0 to 23; the Gauss-Markov states have their own factor.
+    Rows of navigation are a full block over the states before LEV; the Gauss-Markov states have their own factor.
     """
     rows, columns = [], []
     for row in range(NAVIGATION):
@@ -122,7 +123,7 @@ class Room(NamedTuple):
 
     states: Int64Array  # (STATES,) 0, 1, ...
     C: FloatArray  # (3, 3) n from b
-    grown: FloatArray  # (9, 24) transition of navigation over the epoch
+    grown: FloatArray  # (9, LEV) transition of navigation over the epoch
     F: FloatArray  # (1, entries)
     w: FloatArray  # (STATES, STATES)
     g: FloatArray  # (STATES,)
@@ -134,14 +135,23 @@ class Room(NamedTuple):
     step: FloatArray  # (28,) increments of a sample, arm and rates of the antenna
 
 
+class Line(NamedTuple):
+    """Trajectory that a pass is linearised about, at the end of each epoch; no rows: about the filter's own estimate."""
+
+    nav: FloatArray  # (e or 0, 10)
+    value: FloatArray  # (e or 0, STATES)
+
+
 class Kept(NamedTuple):
     """History of a pass; arrays without length are not kept."""
 
     nav: FloatArray  # (n or 0, 10) estimate after each sample, before the measurements of its epoch
     F: FloatArray  # (e, entries)
     p: FloatArray  # (e, KEPT_ROWS, STATES) before the measurements
-    value: FloatArray  # (e, STATES) values before the measurements
-    after: FloatArray  # (e, STATES) corrections that the measurements gave
+    before: FloatArray  # (e, STATES) correction of the filter before the measurements of each epoch
+    after: FloatArray  # (e, STATES) and after them
+    closed: FloatArray  # (e, STATES) what of it was put into the estimate
+    value: FloatArray  # (e, STATES) values before that
     variance: FloatArray  # (e, STATES) variances after the measurements
     columns: Int64Array  # (s, WIDTH) of each scalar
     h: FloatArray  # (s, WIDTH)

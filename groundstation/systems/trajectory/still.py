@@ -85,5 +85,10 @@ def observations_of(middle: FloatArray, still: BoolArray, rate: FloatArray) -> O
     value = np.concatenate([np.zeros((count, 3)), rate[still]])
     sigma = np.repeat([STILL_MPS, STILL_DPS * np.pi / 180.0], count)
     return Observations(
-        np.tile(at, 2), kinds, value, np.tile(sigma[:, None] ** 2, (1, 3)), np.zeros(2 * count, dtype=bool)
+        np.tile(at, 2),
+        kinds,
+        value,
+        np.tile(sigma[:, None] ** 2, (1, 3)),
+        np.zeros(2 * count, dtype=bool),
+        np.zeros((2 * count, 3)),
     )

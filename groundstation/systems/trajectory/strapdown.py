@@ -12,7 +12,7 @@ import math
 
 from groundstation.base.compile import inlined
 from groundstation.base.geodesy import EARTH_RATE_RADPS, ECCENTRICITY_SQUARED, FLATTENING, SEMI_MAJOR_M
-from groundstation.systems.trajectory.states import ATT, BA, BG, LEV, MG, SG, FloatArray
+from groundstation.systems.trajectory.states import ATT, BA, BG, LEV, MA, MG, SA, SG, FloatArray
 
 EQUATOR_MPS2 = 9.7803253359
 SOMIGLIANA = 0.00193185265241
@@ -91,16 +91,17 @@ def mechanise(
 ) -> None:
     """Carry the estimate over one sample, with biases, scale and misalignment taken off it.
 
-    Fills ``step``: 0-2 raw angle increments, 3-5 corrected ones, 6-8 velocity increments in n, 9-11 velocity before, and
-    ``C`` with the attitude at its start.
+    Fills ``C`` with the attitude at its start, and ``step``: 0-2 angle increments as read, 3-5 corrected, 6-8 velocity
+    increments in n, 9-11 velocity before, 12-14 turn of n, 15 interval, 16-18 velocity increments as read.
     """
     x, y, z = angle[k, 0], angle[k, 1], angle[k, 2]
     ax = x - value[BG] * dt - value[SG] * x - value[MG] * y - value[MG + 1] * z
     ay = y - value[BG + 1] * dt - value[SG + 1] * y - value[MG + 2] * x - value[MG + 3] * z
     az = z - value[BG + 2] * dt - value[SG + 2] * z - value[MG + 4] * x - value[MG + 5] * y
-    ux = velocity[k, 0] - value[BA] * dt
-    uy = velocity[k, 1] - value[BA + 1] * dt
-    uz = velocity[k, 2] - value[BA + 2] * dt
+    u, v, w = velocity[k, 0], velocity[k, 1], velocity[k, 2]
+    ux = u - value[BA] * dt - value[SA] * u - value[MA] * v - value[MA + 1] * w
+    uy = v - value[BA + 1] * dt - value[SA + 1] * v - value[MA + 2] * u - value[MA + 3] * w
+    uz = w - value[BA + 2] * dt - value[SA + 2] * w - value[MA + 4] * u - value[MA + 5] * v
     # the increments before, brought to this interval's length
     ratio = 0.0
     if before[6] > 0.5 * dt and before[6] < 2.0 * dt:
@@ -148,6 +149,7 @@ def mechanise(
     step[0], step[1], step[2], step[3], step[4], step[5] = x, y, z, ax, ay, az
     step[6], step[7], step[8], step[9], step[10], step[11] = fn, fe, fd, vn, ve, vd
     step[12], step[13], step[14], step[15] = wn, we, wd, dt
+    step[16], step[17], step[18] = u, v, w
 
 
 @inlined
@@ -179,6 +181,17 @@ def _grow_column(grown: FloatArray, j: int, an: float, ae: float, ad: float, ste
 
 
 @inlined
+def _push_column(grown: FloatArray, j: int, n: float, e: float, d: float, dt: float) -> None:
+    """Let one error of the accelerometer, or of the attitude, act over a sample: it pushes by (n, e, d)."""
+    grown[0, j] += (grown[3, j] + 0.5 * n) * dt
+    grown[1, j] += (grown[4, j] + 0.5 * e) * dt
+    grown[2, j] += (grown[5, j] + 0.5 * d) * dt
+    grown[3, j] += n
+    grown[4, j] += e
+    grown[5, j] += d
+
+
+@inlined
 def grow_transition(C: FloatArray, step: FloatArray, grown: FloatArray) -> None:
     """Let the transition of navigation grow by one sample.
 
@@ -190,12 +203,9 @@ def grow_transition(C: FloatArray, step: FloatArray, grown: FloatArray) -> None:
         _grow_column(grown, BG + i, -x * dt, -y * dt, -z * dt, step)
         a = step[i]
         _grow_column(grown, SG + i, -x * a, -y * a, -z * a, step)
-        grown[0, BA + i] += (grown[3, BA + i] - 0.5 * x * dt) * dt
-        grown[1, BA + i] += (grown[4, BA + i] - 0.5 * y * dt) * dt
-        grown[2, BA + i] += (grown[5, BA + i] - 0.5 * z * dt) * dt
-        grown[3, BA + i] -= x * dt
-        grown[4, BA + i] -= y * dt
-        grown[5, BA + i] -= z * dt
+        _push_column(grown, BA + i, -x * dt, -y * dt, -z * dt, dt)
+        a = step[16 + i]
+        _push_column(grown, SA + i, -x * a, -y * a, -z * a, dt)
     a, b, c = step[0], step[1], step[2]
     _grow_column(grown, MG, -C[0, 0] * b, -C[1, 0] * b, -C[2, 0] * b, step)
     _grow_column(grown, MG + 1, -C[0, 0] * c, -C[1, 0] * c, -C[2, 0] * c, step)
@@ -203,6 +213,13 @@ def grow_transition(C: FloatArray, step: FloatArray, grown: FloatArray) -> None:
     _grow_column(grown, MG + 3, -C[0, 1] * c, -C[1, 1] * c, -C[2, 1] * c, step)
     _grow_column(grown, MG + 4, -C[0, 2] * a, -C[1, 2] * a, -C[2, 2] * a, step)
     _grow_column(grown, MG + 5, -C[0, 2] * b, -C[1, 2] * b, -C[2, 2] * b, step)
+    a, b, c = step[16], step[17], step[18]
+    _push_column(grown, MA, -C[0, 0] * b, -C[1, 0] * b, -C[2, 0] * b, dt)
+    _push_column(grown, MA + 1, -C[0, 0] * c, -C[1, 0] * c, -C[2, 0] * c, dt)
+    _push_column(grown, MA + 2, -C[0, 1] * a, -C[1, 1] * a, -C[2, 1] * a, dt)
+    _push_column(grown, MA + 3, -C[0, 1] * c, -C[1, 1] * c, -C[2, 1] * c, dt)
+    _push_column(grown, MA + 4, -C[0, 2] * a, -C[1, 2] * a, -C[2, 2] * a, dt)
+    _push_column(grown, MA + 5, -C[0, 2] * b, -C[1, 2] * b, -C[2, 2] * b, dt)
     # attitude: the specific force, once for velocity and twice for position
     for i in range(3):
         n, e, d = 0.0, 0.0, 0.0
@@ -212,12 +229,7 @@ def grow_transition(C: FloatArray, step: FloatArray, grown: FloatArray) -> None:
             n, d = step[8], -step[6]
         else:
             n, e = -step[7], step[6]
-        grown[0, ATT + i] += (grown[3, ATT + i] + 0.5 * n) * dt
-        grown[1, ATT + i] += (grown[4, ATT + i] + 0.5 * e) * dt
-        grown[2, ATT + i] += (grown[5, ATT + i] + 0.5 * d) * dt
-        grown[3, ATT + i] += n
-        grown[4, ATT + i] += e
-        grown[5, ATT + i] += d
+        _push_column(grown, ATT + i, n, e, d, dt)
 
 
 @inlined

@@ -32,7 +32,7 @@ def smoothed_track(samples: Samples, one: Pass, at: Int64Array | None = None, *,
     at = output_samples(samples, int(one.plan.schedule.first[0])) if at is None else at
     epoch, share = _place(samples, one, at)
     ends = one.x[:, :NAVIGATION]
-    begins = ends - one.kept.after[:, :NAVIGATION]
+    begins = ends - one.kept.closed[:, :NAVIGATION]
     correction = begins[epoch - 1] * (1.0 - share) + ends[epoch] * share
     variance = np.maximum(one.variance, 0.0)
     spread = variance[epoch - 1] * (1.0 - share) + variance[epoch] * share
@@ -46,7 +46,9 @@ def forward_track(samples: Samples, one: Pass, at: Int64Array | None = None, *, 
     before = np.diagonal(one.kept.p[:, :NAVIGATION, :NAVIGATION], axis1=1, axis2=2)
     after = one.kept.variance[:, :NAVIGATION]
     spread = after[epoch - 1] * (1.0 - share) + before[epoch] * share
-    return _states(samples, one, at, np.zeros((len(at), NAVIGATION)), spread, segment)
+    begins = (one.kept.after - one.kept.closed)[:, :NAVIGATION]
+    correction = begins[epoch - 1] * (1.0 - share) + one.kept.before[epoch, :NAVIGATION] * share
+    return _states(samples, one, at, correction, spread, segment)
 
 
 def _place(samples: Samples, one: Pass, at: Int64Array) -> tuple[Int64Array, FloatArray]:

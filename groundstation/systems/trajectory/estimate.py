@@ -1,0 +1,366 @@
+"""Estimate of a trajectory: start, latency, noise, slip, and the smoothed passes of one segment."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from groundstation.systems.trajectory import observations, slip, still
+from groundstation.systems.trajectory.fit import NUMBERS, Fit, Number, fit_model
+from groundstation.systems.trajectory.forward import run_forward
+from groundstation.systems.trajectory.inputs import GnssFixes, ImuIncrements
+from groundstation.systems.trajectory.model import Model, StartSigmas, gate
+from groundstation.systems.trajectory.observations import Observations
+from groundstation.systems.trajectory.passes import (
+    NOTHING_HELD,
+    OWN_ESTIMATE,
+    PATTERN,
+    Pass,
+    Plan,
+    Samples,
+    Start,
+    at_line,
+    fill_gaps,
+    lay_out,
+    line_of,
+    make_room,
+    nothing_kept,
+    run_pass,
+)
+from groundstation.systems.trajectory.start import starts_at
+from groundstation.systems.trajectory.states import ATT, LAG, LAT, MNT, SLOW, FloatArray, Gate, Line, Noise
+from groundstation.systems.trajectory.track import angles_of, smoothed_track
+
+OPEN_SIGMAS, CLOSED_SIGMAS = 30.0, 5.0  # of the gate, before and after the noise is fitted
+LATENCY_ROUNDS, LATENCY_ENOUGH_S = 6, 0.003
+SETTLE_ROUNDS, LINE_ROUNDS = 3, 2
+FIT_S = 900.0  # seconds behind the first motion that the noise is fitted to
+MOVES_MPS = 1.0
+SETTLED_RAD = 5e-4  # attitude of the start against the pass before
+SLIP = Number("slip_mps", 1.0, 0.3, 20.0)
+PRUNE_S, PRUNE_BELOW = 120.0, 60.0  # hypotheses so far below the best after so long are given up
+SAME_HEADING_DEG = 10.0
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What a segment is estimated from; ``sigma_m`` (3,) is the median of the stated position sigmas."""
+
+    samples: Samples
+    gnss: GnssFixes
+    seen: Observations
+    begin_s: float
+    sigma_m: FloatArray
+    is_still: bool
+    latency_s: float = 0.0
+    lag_s: float = 0.0
+    sigmas: StartSigmas = field(default_factory=StartSigmas)
+    has_slip: bool = False
+
+    def plan(self, model: Model) -> Plan:
+        """Return the epochs and the measurements with the variances of a model."""
+        return lay_out(self.samples, model.weighted(self.seen), self.begin_s, self.latency_s, self.lag_s)
+
+    def noise(self, model: Model) -> Noise:
+        """Return a model's numbers as the loops take them."""
+        return model.noise(self.sigma_m)
+
+    def variances(self, model: Model) -> FloatArray:
+        """Return the variances of the constants at the start."""
+        return self.sigmas.variances(self.noise(model), has_latency=True, has_slip=self.has_slip, has_baro=False)
+
+    def restarted(self, start: Start, model: Model) -> Start:
+        """Return a start with the variances of a model."""
+        variances, p = self.variances(model), start.p.copy()
+        for at in (*range(SLOW, MNT), *range(MNT, MNT + 2)):
+            p[at, :] = p[:, at] = 0.0
+            p[at, at] = variances[at]
+        return replace(start, p=p)
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A heading at the start, what became of it, and the logarithm of its likelihood."""
+
+    start_heading_deg: float
+    end_heading_deg: float
+    likelihood: float
+    start: Start
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Estimate of a segment."""
+
+    problem: Problem
+    model: Model
+    fit: Fit
+    hypotheses: tuple[Hypothesis, ...]
+    result: Pass
+    start: Start
+    line: Line
+    gate: Gate
+    travel: slip.Travel
+
+    @property
+    def latency_s(self) -> float:
+        """Latency of GNSS position."""
+        return self.problem.latency_s + float(self.result.end.value[LAT])
+
+    @property
+    def lag_s(self) -> float:
+        """Latency of GNSS velocity behind that of position."""
+        return self.problem.lag_s + float(self.result.end.value[LAG])
+
+
+def pose(imu: ImuIncrements, gnss: GnssFixes, *, may_stop: bool) -> Problem:
+    """Return the problem of a segment at latency zero."""
+    samples = fill_gaps(imu)
+    have = np.isfinite(gnss.latitude_deg) & np.isfinite(gnss.velocity_mps[:, :2]).all(axis=1)
+    inside = have & (gnss.time_s >= samples.begin_s) & (gnss.time_s < samples.time_s[-1])
+    begin_s = float(gnss.time_s[inside][0])
+    middle, stands, rate = still.still_windows(samples, gnss, 0.0, may_stop=may_stop)
+    seen = observations.joined([observations.of_gnss(gnss), still.observations_of(middle, stands, rate)])
+    near = np.abs(middle - begin_s) < 1.5
+    sigma_m = np.nanmedian(gnss.position_sigma_m[inside], axis=0)
+    return Problem(samples, gnss, seen, begin_s, sigma_m, bool(stands[near].all() and near.any()))
+
+
+def run_only(
+    problem: Problem,
+    plan: Plan,
+    noise: Noise,
+    rules: Gate,
+    start: Start,
+    line: Line = OWN_ESTIMATE,
+    end: int | None = None,
+) -> float:
+    """Filter forward and return the logarithm of the likelihood alone."""
+    last = len(plan.epoch_s) if end is None else end
+    room = make_room(start.prior)
+    return run_forward(
+        problem.samples.imu,
+        plan.schedule,
+        plan.seen,
+        noise,
+        rules,
+        PATTERN,
+        NOTHING_HELD,
+        line,
+        0,
+        last,
+        start.now(),
+        room,
+        nothing_kept(),
+    )
+
+
+def hypotheses_of(problem: Problem, model: Model, rules: Gate) -> tuple[Hypothesis, ...]:
+    """Return the heading hypotheses by likelihood, the best first; those that became one are one."""
+    plan, noise = problem.plan(model), problem.noise(model)
+    starts = starts_at(
+        problem.samples,
+        problem.gnss,
+        plan.epoch_s[0],
+        noise,
+        problem.sigmas,
+        problem.variances(model),
+        is_still=problem.is_still,
+        latency_s=problem.latency_s,
+    )
+    early = int(np.searchsorted(plan.epoch_s, _first_motion_s(problem.gnss, plan.epoch_s[0]) + PRUNE_S))
+    early = min(early, len(plan.epoch_s))
+    runs = []
+    for start in starts:
+        now, room = start.now(), make_room(start.prior)
+        value = run_forward(
+            problem.samples.imu,
+            plan.schedule,
+            plan.seen,
+            noise,
+            rules,
+            PATTERN,
+            NOTHING_HELD,
+            OWN_ESTIMATE,
+            0,
+            early,
+            now,
+            room,
+            nothing_kept(),
+        )
+        runs.append((value, start, now, room))
+    best = max(value for value, *_ in runs)
+    found = []
+    for value, start, now, room in runs:
+        if not value >= best - PRUNE_BELOW:
+            continue
+        total = value + run_forward(
+            problem.samples.imu,
+            plan.schedule,
+            plan.seen,
+            noise,
+            rules,
+            PATTERN,
+            NOTHING_HELD,
+            OWN_ESTIMATE,
+            early,
+            len(plan.epoch_s),
+            now,
+            room,
+            nothing_kept(),
+        )
+        found.append(Hypothesis(heading_of(start.nav), heading_of(now.nav), total, start))
+    found.sort(key=lambda one: -one.likelihood)
+    kept: list[Hypothesis] = []
+    for one in found:
+        apart = [abs((one.end_heading_deg - other.end_heading_deg + 180.0) % 360.0 - 180.0) for other in kept]
+        if all(angle > SAME_HEADING_DEG for angle in apart):
+            kept.append(one)
+    return tuple(kept)
+
+
+def heading_of(nav: FloatArray) -> float:
+    """Return the heading of an estimate, deg."""
+    return float(np.degrees(angles_of(nav[None, 6:])[2][0]) % 360.0)
+
+
+def _first_motion_s(gnss: GnssFixes, begin_s: float) -> float:
+    speed = np.linalg.norm(np.nan_to_num(gnss.velocity_mps[:, :2]), axis=1)
+    moving = gnss.time_s[(speed > MOVES_MPS) & (gnss.time_s >= begin_s)]
+    return float(moving[0]) if len(moving) else begin_s
+
+
+def settle(problem: Problem, model: Model, rules: Gate, start: Start, rounds: int) -> tuple[Problem, Start, Pass]:
+    """Run passes until the latency stands; each begins where the one before was smoothed to."""
+    for _ in range(rounds):
+        plan = problem.plan(model)
+        done = run_pass(problem.samples, plan, problem.noise(model), rules, start)
+        late, lag = float(done.end.value[LAT]), float(done.end.value[LAG])
+        start = done.start
+        value, prior = start.value.copy(), start.prior.copy()
+        for at, by in ((LAT, late), (LAG, lag)):
+            value[at] -= by
+            prior[at] = -(problem.latency_s if at == LAT else problem.lag_s) - by
+            value[at] = 0.0
+        start = replace(start, value=value, prior=prior)
+        problem = replace(problem, latency_s=problem.latency_s + late, lag_s=problem.lag_s + lag)
+        turned_rad = float(np.linalg.norm(done.x[0, ATT : ATT + 3]))
+        if max(abs(late), abs(lag)) < LATENCY_ENOUGH_S and turned_rad < SETTLED_RAD:
+            break
+    return problem, start, done
+
+
+def relinearised(
+    problem: Problem, model: Model, rules: Gate, done: Pass, rounds: int = LINE_ROUNDS
+) -> tuple[Pass, Start, Line]:
+    """Run passes that are linearised about the smoothed trajectory of the one before.
+
+    A filter that is linearised about its own estimate thinks that it sees what it cannot: as the estimate moves, the
+    combination of errors that no datum shows moves too.
+
+    Source: B. M. Bell, The iterated Kalman smoother as a Gauss-Newton method, SIAM J. Optimization 4, 1994; G. P. Huang,
+    A. I. Mourikis, S. I. Roumeliotis, Observability-based rules for consistent EKF SLAM, 2010.
+    """
+    plan, noise, line = problem.plan(model), problem.noise(model), OWN_ESTIMATE
+    start = done.start
+    for _ in range(rounds):
+        line = line_of(done)
+        start = problem.restarted(at_line(done.start, line), model)
+        done = run_pass(problem.samples, plan, noise, rules, start, line)
+    return done, start, line
+
+
+def fitted(
+    problem: Problem,
+    model: Model,
+    rules: Gate,
+    start: Start,
+    line: Line,
+    numbers: tuple[Number, ...] = NUMBERS,
+) -> Fit:
+    """Fit the numbers of the model to the first part of the log that moves."""
+    last_s = _first_motion_s(problem.gnss, problem.begin_s) + FIT_S
+
+    def likelihood(at: Model) -> float:
+        plan = problem.plan(at)
+        end = int(np.searchsorted(plan.epoch_s, last_s))
+        return run_only(problem, plan, problem.noise(at), rules, problem.restarted(start, at), line, end)
+
+    return fit_model(model, likelihood, numbers)
+
+
+Progress = Callable[[str], None]
+
+
+def estimate(
+    imu: ImuIncrements,
+    gnss: GnssFixes,
+    *,
+    may_roll: bool = False,
+    may_stop: bool = True,
+    prior: Model | None = None,
+    fit: bool = True,
+) -> Estimate:
+    """Estimate the trajectory of one segment.
+
+    Parameters
+    ----------
+    imu, gnss
+    may_roll : bool
+        The vehicle rolls: it does not slip, where the data agree.
+    may_stop : bool
+        It may stand still on its way.
+    prior : Model, optional
+        Numbers of the class.
+    fit : bool
+        False: the numbers of ``prior`` as they are.
+    """
+    model = Model() if prior is None else prior
+    problem = pose(imu, gnss, may_stop=may_stop)
+    open_gate, rules = gate(OPEN_SIGMAS), gate(CLOSED_SIGMAS)
+    first = hypotheses_of(problem, model, open_gate)
+    problem, start, done = settle(problem, model, open_gate, first[0].start, LATENCY_ROUNDS)
+    _, done = _at(problem, model, rules, start)
+    found = Fit(model, done.likelihood, 0, ())
+    if fit:
+        done, start, line = relinearised(problem, model, rules, done)
+        found = fitted(problem, model, rules, start, line)
+        model = found.model
+    problem, start, done = settle(problem, model, rules, problem.restarted(start, model), SETTLE_ROUNDS)
+    start, done = _at(problem, model, rules, start)
+    travel = slip.direction_of_travel(smoothed_track(problem.samples, done))
+    if may_roll and travel.does_roll:
+        track = smoothed_track(problem.samples, done)
+        seen = observations.joined([problem.seen, slip.observations_of(track)])
+        problem = replace(problem, seen=seen, has_slip=True)
+        value = start.value.copy()
+        value[MNT], value[MNT + 1] = travel.yaw_rad, travel.pitch_rad
+        start = replace(start, value=value)
+        start, done = _at(problem, model, rules, problem.restarted(start, model))
+        if fit:
+            done, start, line = relinearised(problem, model, rules, done)
+            found = fitted(problem, model, rules, start, line, (SLIP,))
+            model = found.model
+            start, done = _at(problem, model, rules, problem.restarted(start, model))
+    done, start, line = relinearised(problem, model, rules, done)
+    last = hypotheses_of(problem, model, rules)
+    return Estimate(problem, model, found, last, done, start, line, rules, travel)
+
+
+def _at(problem: Problem, model: Model, rules: Gate, start: Start) -> tuple[Start, Pass]:
+    """Run one pass at the latency that stands."""
+    done = run_pass(problem.samples, problem.plan(model), problem.noise(model), rules, start)
+    return done.start, done
+
+
+def masked(seen: Observations, windows: FloatArray, latency_s: float) -> Observations:
+    """Return the observations without GNSS and standstill inside windows of time, shape (w, 2).
+
+    What knows of the standstill by GNSS is not known without it.
+    """
+    from groundstation.systems.trajectory.states import NO_SLIP
+
+    valid_s = seen.time_s - np.where(seen.is_gnss, latency_s, 0.0)
+    at = np.searchsorted(windows[:, 0], valid_s, side="right") - 1
+    inside = (at >= 0) & (valid_s < windows[np.maximum(at, 0), 1]) & (seen.kind != NO_SLIP)
+    return seen.take(~inside)
