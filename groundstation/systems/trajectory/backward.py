@@ -8,16 +8,16 @@ Source: G. J. Bierman, Fixed interval smoothing with discrete measurements, Int.
 
 from groundstation.base.compile import in_place
 from groundstation.methods.kalman.arrays import Pattern
-from groundstation.systems.trajectory.states import KEPT_ROWS, STATES, WIDTH, FloatArray, Kept, Schedule
+from groundstation.systems.trajectory.states import KEPT_ROWS, STATES, WIDTH, FloatArray, Linear, Schedule, Solved
 
 
 @in_place
-def back_over_scalar(at: int, kept: Kept, a: FloatArray, A: FloatArray, u: FloatArray) -> None:
+def back_over_scalar(at: int, linear: Linear, solved: Solved, a: FloatArray, A: FloatArray, u: FloatArray) -> None:
     """Take the adjoint back over one scalar measurement.
 
     a <- (I - K h)' a - h' y / S; A <- (I - K h)' A (I - K h) + h' h / S.
     """
-    K, weight = kept.K[at], 1.0 / kept.S[at]
+    K, weight = solved.K[at], 1.0 / solved.S[at]
     total = 0.0
     for j in range(STATES):
         total += K[j] * a[j]
@@ -28,33 +28,33 @@ def back_over_scalar(at: int, kept: Kept, a: FloatArray, A: FloatArray, u: Float
             s += A[i, j] * K[j]
         u[i] = s  # A K
         inner += K[i] * s
-    total += kept.y[at] * weight
+    total += solved.y[at] * weight
     inner += weight
     for e in range(WIDTH):
-        value = kept.h[at, e]
+        value = linear.h[at, e]
         if value == 0.0:
             continue
-        r = kept.columns[at, e]
+        r = linear.columns[at, e]
         a[r] -= value * total
         for j in range(STATES):
             A[r, j] -= value * u[j]
             A[j, r] -= value * u[j]
     for e in range(WIDTH):
-        value = kept.h[at, e]
+        value = linear.h[at, e]
         if value == 0.0:
             continue
-        r = kept.columns[at, e]
+        r = linear.columns[at, e]
         for f in range(WIDTH):
-            A[r, kept.columns[at, f]] += value * kept.h[at, f] * inner
+            A[r, linear.columns[at, f]] += value * linear.h[at, f] * inner
 
 
 @in_place
 def back_over_step(
-    e: int, pattern: Pattern, kept: Kept, a: FloatArray, A: FloatArray, w: FloatArray, u: FloatArray
+    e: int, pattern: Pattern, linear: Linear, a: FloatArray, A: FloatArray, w: FloatArray, u: FloatArray
 ) -> None:
     """Take the adjoint back over the transition that leads to epoch e: a <- F' a, A <- F' A F."""
     rows, starts, columns = pattern
-    F = kept.F[e]
+    F = linear.F[e]
     for j in range(STATES):
         u[j] = a[j]
         for i in range(STATES):
@@ -94,7 +94,8 @@ def back_over_step(
 def run_backward(
     schedule: Schedule,
     pattern: Pattern,
-    kept: Kept,
+    linear: Linear,
+    solved: Solved,
     begin: int,
     end: int,
     a: FloatArray,
@@ -122,19 +123,19 @@ def run_backward(
     for e in range(end - 1, begin - 1, -1):
         for m in range(schedule.seen[e + 1] - 1, schedule.seen[e] - 1, -1):
             for i in range(2, -1, -1):
-                if kept.mark[3 * m + i] == 1:
-                    back_over_scalar(3 * m + i, kept, a, A, u)
+                if solved.mark[3 * m + i] == 1:
+                    back_over_scalar(3 * m + i, linear, solved, a, A, u)
         for i in range(KEPT_ROWS):
             total, spread = 0.0, 0.0
             for j in range(STATES):
-                total += kept.p[e, i, j] * a[j]
+                total += solved.p[e, i, j] * a[j]
                 s = 0.0
                 for r in range(STATES):
-                    s += A[j, r] * kept.p[e, i, r]
-                spread += kept.p[e, i, j] * s
+                    s += A[j, r] * solved.p[e, i, r]
+                spread += solved.p[e, i, j] * s
             x[e, i] = -total
-            variance[e, i] = kept.p[e, i, i] - spread
-        back_over_step(e, pattern, kept, a, A, w, u)
+            variance[e, i] = solved.p[e, i, i] - spread
+        back_over_step(e, pattern, linear, a, A, w, u)
     for i in range(STATES):
         total = 0.0
         for j in range(STATES):

@@ -22,13 +22,29 @@ from groundstation.systems.trajectory.passes import (
     at_line,
     fill_gaps,
     lay_out,
+    likelihood_of,
     line_of,
+    linear_room,
     make_room,
     nothing_kept,
     run_pass,
 )
 from groundstation.systems.trajectory.start import starts_at
-from groundstation.systems.trajectory.states import ATT, LAG, LAT, MNT, SLOW, FloatArray, Gate, Line, Noise
+from groundstation.systems.trajectory.states import (
+    ATT,
+    BARO,
+    LAG,
+    LAT,
+    LEV,
+    MNT,
+    SG,
+    SLOW,
+    FloatArray,
+    Gate,
+    Noise,
+    Now,
+    Room,
+)
 from groundstation.systems.trajectory.track import angles_of, smoothed_track
 
 OPEN_SIGMAS, CLOSED_SIGMAS = 30.0, 5.0  # of the gate, before and after the noise is fitted
@@ -67,12 +83,12 @@ class Problem:
 
     def variances(self, model: Model) -> FloatArray:
         """Return the variances of the constants at the start."""
-        return self.sigmas.variances(self.noise(model), has_latency=True, has_slip=self.has_slip, has_baro=False)
+        return self.sigmas.variances(self.noise(model), model, has_latency=True, has_slip=self.has_slip, has_baro=False)
 
     def restarted(self, start: Start, model: Model) -> Start:
         """Return a start with the variances of a model."""
         variances, p = self.variances(model), start.p.copy()
-        for at in (*range(SLOW, MNT), *range(MNT, MNT + 2)):
+        for at in (*range(SG, LEV), *range(SLOW, BARO)):
             p[at, :] = p[:, at] = 0.0
             p[at, at] = variances[at]
         return replace(start, p=p)
@@ -97,20 +113,18 @@ class Estimate:
     fit: Fit
     hypotheses: tuple[Hypothesis, ...]
     result: Pass
-    start: Start
-    line: Line
     gate: Gate
     travel: slip.Travel
 
     @property
     def latency_s(self) -> float:
         """Latency of GNSS position."""
-        return self.problem.latency_s + float(self.result.end.value[LAT])
+        return self.problem.latency_s + float(self.result.constants[LAT])
 
     @property
     def lag_s(self) -> float:
         """Latency of GNSS velocity behind that of position."""
-        return self.problem.lag_s + float(self.result.end.value[LAG])
+        return self.problem.lag_s + float(self.result.constants[LAG])
 
 
 def pose(imu: ImuIncrements, gnss: GnssFixes, *, may_stop: bool) -> Problem:
@@ -124,35 +138,6 @@ def pose(imu: ImuIncrements, gnss: GnssFixes, *, may_stop: bool) -> Problem:
     near = np.abs(middle - begin_s) < 1.5
     sigma_m = np.nanmedian(gnss.position_sigma_m[inside], axis=0)
     return Problem(samples, gnss, seen, begin_s, sigma_m, bool(stands[near].all() and near.any()))
-
-
-def run_only(
-    problem: Problem,
-    plan: Plan,
-    noise: Noise,
-    rules: Gate,
-    start: Start,
-    line: Line = OWN_ESTIMATE,
-    end: int | None = None,
-) -> float:
-    """Filter forward and return the logarithm of the likelihood alone."""
-    last = len(plan.epoch_s) if end is None else end
-    room = make_room(start.prior)
-    return run_forward(
-        problem.samples.imu,
-        plan.schedule,
-        plan.seen,
-        noise,
-        rules,
-        PATTERN,
-        NOTHING_HELD,
-        line,
-        0,
-        last,
-        start.now(),
-        room,
-        nothing_kept(),
-    )
 
 
 def hypotheses_of(problem: Problem, model: Model, rules: Gate) -> tuple[Hypothesis, ...]:
@@ -170,46 +155,38 @@ def hypotheses_of(problem: Problem, model: Model, rules: Gate) -> tuple[Hypothes
     )
     early = int(np.searchsorted(plan.epoch_s, _first_motion_s(problem.gnss, plan.epoch_s[0]) + PRUNE_S))
     early = min(early, len(plan.epoch_s))
+    room = linear_room(problem.samples, plan)
+
+    def run(begin: int, end: int, now: Now, work: Room) -> float:
+        return run_forward(
+            problem.samples.imu,
+            plan.schedule,
+            plan.seen,
+            noise,
+            rules,
+            PATTERN,
+            NOTHING_HELD,
+            OWN_ESTIMATE,
+            True,
+            True,
+            begin,
+            end,
+            now,
+            work,
+            room,
+            nothing_kept(),
+        )
+
     runs = []
     for start in starts:
-        now, room = start.now(), make_room(start.prior)
-        value = run_forward(
-            problem.samples.imu,
-            plan.schedule,
-            plan.seen,
-            noise,
-            rules,
-            PATTERN,
-            NOTHING_HELD,
-            OWN_ESTIMATE,
-            0,
-            early,
-            now,
-            room,
-            nothing_kept(),
-        )
-        runs.append((value, start, now, room))
+        now, work = start.now(), make_room(start.prior)
+        runs.append((run(0, early, now, work), start, now, work))
     best = max(value for value, *_ in runs)
     found = []
-    for value, start, now, room in runs:
-        if not value >= best - PRUNE_BELOW:
-            continue
-        total = value + run_forward(
-            problem.samples.imu,
-            plan.schedule,
-            plan.seen,
-            noise,
-            rules,
-            PATTERN,
-            NOTHING_HELD,
-            OWN_ESTIMATE,
-            early,
-            len(plan.epoch_s),
-            now,
-            room,
-            nothing_kept(),
-        )
-        found.append(Hypothesis(heading_of(start.nav), heading_of(now.nav), total, start))
+    for value, start, now, work in runs:
+        if value >= best - PRUNE_BELOW:
+            total = value + run(early, len(plan.epoch_s), now, work)
+            found.append(Hypothesis(heading_of(start.nav), heading_of(now.nav), total, start))
     found.sort(key=lambda one: -one.likelihood)
     kept: list[Hypothesis] = []
     for one in found:
@@ -235,7 +212,7 @@ def settle(problem: Problem, model: Model, rules: Gate, start: Start, rounds: in
     for _ in range(rounds):
         plan = problem.plan(model)
         done = run_pass(problem.samples, plan, problem.noise(model), rules, start)
-        late, lag = float(done.end.value[LAT]), float(done.end.value[LAG])
+        late, lag = float(done.constants[LAT]), float(done.constants[LAG])
         start = done.start
         value, prior = start.value.copy(), start.prior.copy()
         for at, by in ((LAT, late), (LAG, lag)):
@@ -250,9 +227,7 @@ def settle(problem: Problem, model: Model, rules: Gate, start: Start, rounds: in
     return problem, start, done
 
 
-def relinearised(
-    problem: Problem, model: Model, rules: Gate, done: Pass, rounds: int = LINE_ROUNDS
-) -> tuple[Pass, Start, Line]:
+def relinearised(problem: Problem, model: Model, rules: Gate, done: Pass, rounds: int = LINE_ROUNDS) -> Pass:
     """Run passes that are linearised about the smoothed trajectory of the one before.
 
     A filter that is linearised about its own estimate thinks that it sees what it cannot: as the estimate moves, the
@@ -261,30 +236,23 @@ def relinearised(
     Source: B. M. Bell, The iterated Kalman smoother as a Gauss-Newton method, SIAM J. Optimization 4, 1994; G. P. Huang,
     A. I. Mourikis, S. I. Roumeliotis, Observability-based rules for consistent EKF SLAM, 2010.
     """
-    plan, noise, line = problem.plan(model), problem.noise(model), OWN_ESTIMATE
-    start = done.start
+    plan, noise = problem.plan(model), problem.noise(model)
     for _ in range(rounds):
         line = line_of(done)
         start = problem.restarted(at_line(done.start, line), model)
         done = run_pass(problem.samples, plan, noise, rules, start, line)
-    return done, start, line
+    return done
 
 
-def fitted(
-    problem: Problem,
-    model: Model,
-    rules: Gate,
-    start: Start,
-    line: Line,
-    numbers: tuple[Number, ...] = NUMBERS,
-) -> Fit:
-    """Fit the numbers of the model to the first part of the log that moves."""
+def fitted(problem: Problem, model: Model, rules: Gate, done: Pass, numbers: tuple[Number, ...] = NUMBERS) -> Fit:
+    """Fit the numbers of the model to the first part of the log that moves, about the line of a pass."""
     last_s = _first_motion_s(problem.gnss, problem.begin_s) + FIT_S
+    end = int(np.searchsorted(done.plan.epoch_s, last_s))
 
     def likelihood(at: Model) -> float:
         plan = problem.plan(at)
-        end = int(np.searchsorted(plan.epoch_s, last_s))
-        return run_only(problem, plan, problem.noise(at), rules, problem.restarted(start, at), line, end)
+        start = problem.restarted(done.begun, at)
+        return likelihood_of(problem.samples, plan, problem.noise(at), rules, start, done.linear, end)
 
     return fit_model(model, likelihood, numbers)
 
@@ -323,8 +291,8 @@ def estimate(
     _, done = _at(problem, model, rules, start)
     found = Fit(model, done.likelihood, 0, ())
     if fit:
-        done, start, line = relinearised(problem, model, rules, done)
-        found = fitted(problem, model, rules, start, line)
+        done = relinearised(problem, model, rules, done)
+        found = fitted(problem, model, rules, done)
         model = found.model
     problem, start, done = settle(problem, model, rules, problem.restarted(start, model), SETTLE_ROUNDS)
     start, done = _at(problem, model, rules, start)
@@ -338,13 +306,13 @@ def estimate(
         start = replace(start, value=value)
         start, done = _at(problem, model, rules, problem.restarted(start, model))
         if fit:
-            done, start, line = relinearised(problem, model, rules, done)
-            found = fitted(problem, model, rules, start, line, (SLIP,))
+            done = relinearised(problem, model, rules, done)
+            found = fitted(problem, model, rules, done, (SLIP,))
             model = found.model
             start, done = _at(problem, model, rules, problem.restarted(start, model))
-    done, start, line = relinearised(problem, model, rules, done)
+    done = relinearised(problem, model, rules, done)
     last = hypotheses_of(problem, model, rules)
-    return Estimate(problem, model, found, last, done, start, line, rules, travel)
+    return Estimate(problem, model, found, last, done, rules, travel)
 
 
 def _at(problem: Problem, model: Model, rules: Gate, start: Start) -> tuple[Start, Pass]:

@@ -31,6 +31,8 @@ NUMBERS = (
     Number("position_scale", 1.0, 0.02, 20.0),
     Number("slow_scale", 1.0, 0.05, 10.0),
     Number("fast_scale", 1.0, 0.02, 10.0),
+    Number("gyro_imperfection", 1.0, 0.03, 10.0),
+    Number("accel_imperfection", 1.0, 0.03, 10.0),
     Number("jitter_s", 1.0, 0.1, 30.0),
     Number("gyro_walk_dps_rth", 1.0, 0.02, 30.0),
     Number("accel_walk_mg_rth", 1.0, 0.02, 30.0),

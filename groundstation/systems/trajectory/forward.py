@@ -1,14 +1,18 @@
-"""Compiled filter of a pass: strapdown between epochs, measurements at them, estimate closed after each.
+"""Compiled filter of a pass: strapdown between epochs, measurements at them.
 
-Letters as in ``methods.kalman.kernels``. The loop keeps what the smoother goes back over.
+It has two parts, which one loop runs epoch by epoch: *carrying* the estimate over the samples and linearising the
+measurements about it, and *solving* for the correction with its covariance. Where all is linearised about a known
+trajectory the first is done once, and the second again for each noise and each outage.
 
-Source: P. D. Groves, 2013, chapter 14 (closed-loop integration of inertial data and GNSS); the rows of the transition
-are summed over the samples of an epoch.
+Letters as in ``methods.kalman.kernels``.
+
+Source: P. D. Groves, 2013, chapter 14 (integration of inertial data and GNSS); the rows of the transition are summed
+over the samples of an epoch.
 """
 
 import math
 
-from groundstation.base.compile import in_place
+from groundstation.base.compile import in_place, inlined
 from groundstation.base.geodesy import ECCENTRICITY_SQUARED, SEMI_MAJOR_M
 from groundstation.base.records import Int64Array
 from groundstation.methods.kalman.arrays import Pattern
@@ -32,13 +36,14 @@ from groundstation.systems.trajectory.states import (
     WIDTH,
     Gate,
     Imu,
-    Kept,
     Line,
+    Linear,
     Noise,
     Now,
     Room,
     Schedule,
     Seen,
+    Solved,
 )
 from groundstation.systems.trajectory.strapdown import (
     begin_transition,
@@ -53,82 +58,107 @@ BLOCK = 9 * LEV  # entries of the navigation rows of the transition
 
 
 @in_place
-def carry(first: int, last: int, imu: Imu, noise: Noise, pattern: Pattern, now: Now, room: Room, kept: Kept) -> float:
-    """Carry estimate and covariance over samples ``first`` to ``last`` (not included); return the time.
-
-    The covariance gets the noise of the unit and of the Gauss-Markov states.
-    """
-    value, nav, p, F = now.value, now.nav, now.p, room.F
+def carry(e: int, first: int, last: int, imu: Imu, noise: Noise, now: Now, room: Room, linear: Linear) -> None:
+    """Carry the estimate over samples ``first`` to ``last`` (not included) and fill the transition of epoch e."""
+    value, nav, step, spent = now.value, now.nav, room.step, linear.spent
     begin_transition(room.grown)
-    total, angle, velocity, fast_angle = 0.0, 0.0, 0.0, 0.0
     turn = room.y
-    turn[0], turn[1], turn[2] = 0.0, 0.0, 0.0
-    for k in range(first, last):
-        mechanise(imu.interval_s[k], imu.angle, imu.velocity, k, value, nav, now.before, room.C, room.step)
-        grow_transition(room.C, room.step, room.grown)
-        for i in range(3):
-            turn[i] += room.step[12 + i]
-        a, b, c = room.step[3], room.step[4], room.step[5]
-        fast_angle += (a * a + b * b + c * c) / imu.interval_s[k]
-        total += imu.interval_s[k]
-        angle += imu.angle_variance[k]
-        velocity += imu.velocity_variance[k]
-        if kept.nav.shape[0] > 0:
-            for i in range(10):
-                kept.nav[k, i] = nav[i]
-    finish_transition(nav, total, turn, room.grown, F)
-    for i in range(7):
-        at = 2 if i == 6 else i // 3
-        decay = math.exp(-total / noise.time_s[at])
-        F[0, BLOCK + i] = decay
-    for i in range(SLOW, SLOW + 6):
-        value[i] *= F[0, BLOCK + i - SLOW]
-    value[BARO] *= F[0, BLOCK + 6]
-    predict_covariance(room.states, pattern, F, 0, p, room.w)
-    predict_states(room.states, pattern, F, 0, room.x, room.w)
-    density = noise.density
     for i in range(3):
-        q = density[1] * total + velocity
+        turn[i] = 0.0
+        spent[e, i] = 0.0
+    spent[e, 3] = 0.0
+    keeps = linear.nav.shape[0] > 0
+    for k in range(first, last):
+        mechanise(imu.interval_s[k], imu.angle, imu.velocity, k, value, nav, now.before, room.C, step)
+        grow_transition(room.C, step, room.grown)
+        for i in range(3):
+            turn[i] += step[12 + i]
+        a, b, c = step[3], step[4], step[5]
+        spent[e, 0] += imu.interval_s[k]
+        spent[e, 1] += (a * a + b * b + c * c) / imu.interval_s[k]
+        spent[e, 2] += imu.angle_variance[k]
+        spent[e, 3] += imu.velocity_variance[k]
+        if keeps:
+            for i in range(10):
+                linear.nav[k, i] = nav[i]
+    total = spent[e, 0]
+    finish_transition(nav, total, turn, room.grown, linear.F[e])
+    for i in range(7):
+        linear.F[e, BLOCK + i] = math.exp(-total / noise.time_s[2 if i == 6 else i // 3])
+    for i in range(6):
+        value[SLOW + i] *= linear.F[e, BLOCK + i]
+    value[BARO] *= linear.F[e, BLOCK + 6]
+    rotation_of(nav, room.C)
+
+
+@in_place
+def linearise(e: int, schedule: Schedule, seen: Seen, now: Now, room: Room, linear: Linear) -> None:
+    """Fill the rows of the measurements of epoch e, about the estimate."""
+    for m in range(schedule.seen[e], schedule.seen[e + 1]):
+        observe(m, seen, now, room)
+        for i in range(3):
+            at = 3 * m + i
+            linear.z[at] = room.y[i]
+            for j in range(WIDTH):
+                linear.columns[at, j] = room.columns[i, j]
+                linear.h[at, j] = room.h[i, j]
+
+
+@in_place
+def predict(e: int, noise: Noise, pattern: Pattern, now: Now, room: Room, linear: Linear) -> None:
+    """Carry the correction and its covariance to epoch e."""
+    p, F, spent, density = now.p, linear.F, linear.spent, noise.density
+    predict_covariance(room.states, pattern, F, e, p, room.w)
+    predict_states(room.states, pattern, F, e, room.x, room.w)
+    total = spent[e, 0]
+    for i in range(3):
+        q = density[1] * total + spent[e, 3]
         p[i, i] += q * total * total / 3.0
         p[i, 3 + i] += 0.5 * q * total
         p[3 + i, i] = p[i, 3 + i]
         p[3 + i, 3 + i] += q
-        p[6 + i, 6 + i] += density[0] * total + density[4] * fast_angle + angle
+        p[6 + i, 6 + i] += density[0] * total + density[4] * spent[e, 1] + spent[e, 2]
         p[BG + i, BG + i] += density[2] * total
         p[BA + i, BA + i] += density[3] * total
     for i in range(6):
-        at = SLOW + i
-        decay = F[0, BLOCK + i]
+        at, decay = SLOW + i, F[e, BLOCK + i]
         p[at, at] += noise.variance[i] * (1.0 - decay * decay)
-    p[BARO, BARO] += noise.variance[6] * (1.0 - F[0, BLOCK + 6] * F[0, BLOCK + 6])
-    return total
+    p[BARO, BARO] += noise.variance[6] * (1.0 - F[e, BLOCK + 6] * F[e, BLOCK + 6])
+
+
+@inlined
+def _is_absent(at: int, m: int, i: int, seen: Seen, linear: Linear) -> bool:
+    z, variance = linear.z[at], seen.variance[m, i]
+    return z == NO_ROW or z != z or variance != variance
 
 
 @in_place
-def update(m: int, scalar: int, seen: Seen, gate: Gate, held: Int64Array, now: Now, room: Room, kept: Kept) -> float:
+def update(
+    m: int, seen: Seen, gate: Gate, held: Int64Array, now: Now, room: Room, linear: Linear, solved: Solved
+) -> float:
     """Use measurement m; return the logarithm of its likelihood.
 
-    ``scalar`` is its first scalar's place in the history. The scalars of a measurement are judged together against
-    the gate.
+    The scalars of a measurement are judged together against the gate.
     """
-    p, x, y = now.p, room.x, room.y
-    rotation_of(now.nav, room.C)
-    observe(m, seen, now, room)
-    keeps = kept.y.shape[0] > 0
+    p, x = now.p, room.x
+    keeps = solved.y.shape[0] > 0
     kind = seen.kind[m]
     count, squared = 0, 0.0
     for i in range(3):
+        at = 3 * m + i
         if keeps:
-            kept.mark[scalar + i] = 0
-        if y[i] == NO_ROW or y[i] != y[i] or seen.variance[m, i] != seen.variance[m, i]:
+            solved.mark[at] = 0
+        if _is_absent(at, m, i, seen, linear):
             continue
-        y[i] -= predicted(room.columns[i], room.h[i], 0, WIDTH, x, 0)
+        columns, h = linear.columns[at], linear.h[at]
         s = seen.variance[m, i]
-        for e in range(WIDTH):
-            for f in range(WIDTH):
-                s += room.h[i, e] * room.h[i, f] * p[room.columns[i, e], room.columns[i, f]]
-        squared += y[i] * y[i] / s
-        y[i] += predicted(room.columns[i], room.h[i], 0, WIDTH, x, 0)
+        for j in range(WIDTH):
+            a = h[j]
+            if a != 0.0:
+                for k in range(WIDTH):
+                    s += a * h[k] * p[columns[j], columns[k]]
+        innovation = linear.z[at] - predicted(columns, h, 0, WIDTH, x, 0)
+        squared += innovation * innovation / s
         count += 1
     if count == 0:
         return 0.0
@@ -137,37 +167,36 @@ def update(m: int, scalar: int, seen: Seen, gate: Gate, held: Int64Array, now: N
         if now.in_a_row[kind] < gate.patience:
             if keeps:
                 for i in range(3):
-                    kept.mark[scalar + i] = -1
+                    solved.mark[3 * m + i] = -1
             return -0.5 * gate.largest * count
         for i in range(NAVIGATION):
             p[i, i] += gate.opened[i]
     now.in_a_row[kind] = 0
     likelihood = 0.0
     for i in range(3):
-        if y[i] == NO_ROW or y[i] != y[i] or seen.variance[m, i] != seen.variance[m, i]:
+        at = 3 * m + i
+        if _is_absent(at, m, i, seen, linear):
             continue
-        innovation = y[i] - predicted(room.columns[i], room.h[i], 0, WIDTH, x, 0)
-        s = update_covariance(
-            room.states, room.columns[i], room.h[i], 0, WIDTH, seen.variance[m, i], held, p, room.g, room.K
-        )
+        columns, h = linear.columns[at], linear.h[at]
+        innovation = linear.z[at] - predicted(columns, h, 0, WIDTH, x, 0)
+        s = update_covariance(room.states, columns, h, 0, WIDTH, seen.variance[m, i], held, p, room.g, room.K)
         correct_states(room.states, room.K, innovation, x, 0)
         likelihood -= 0.5 * (innovation * innovation / s + math.log(s))
         if keeps:
-            at = scalar + i
-            kept.mark[at] = 1
-            kept.y[at], kept.S[at] = innovation, s
+            solved.mark[at] = 1
+            solved.y[at], solved.S[at] = innovation, s
             for j in range(STATES):
-                kept.K[at, j] = room.K[j]
-            for e in range(WIDTH):
-                kept.columns[at, e] = room.columns[i, e]
-                kept.h[at, e] = room.h[i, e]
+                solved.K[at, j] = room.K[j]
     return likelihood
 
 
 @in_place
-def close(e: int, line: Line, now: Now, room: Room, kept: Kept) -> None:
-    """Put the corrections of an epoch into the estimate, or bring it back to the line of linearisation."""
-    nav, value, x, by = now.nav, now.value, room.x, room.g
+def close(e: int, line: Line, now: Now, room: Room, linear: Linear) -> None:
+    """Put the corrections of an epoch into the estimate, or bring it back to the line of linearisation.
+
+    What the estimate is moved by goes to ``linear.closed``.
+    """
+    nav, value, x, by = now.nav, now.value, room.x, linear.closed[e]
     sine = math.sin(nav[0])
     root = 1.0 - ECCENTRICITY_SQUARED * sine * sine
     east = SEMI_MAJOR_M / math.sqrt(root)
@@ -195,8 +224,7 @@ def close(e: int, line: Line, now: Now, room: Room, kept: Kept) -> None:
         # the turn from the estimate to the line: quaternion of the line times the inverse of the estimate's
         a, b, c, d = wanted[6], wanted[7], wanted[8], wanted[9]
         p, q, r, s = nav[6], -nav[7], -nav[8], -nav[9]
-        w = a * p - b * q - c * r - d * s
-        sign = 2.0 if w >= 0.0 else -2.0
+        sign = 2.0 if a * p - b * q - c * r - d * s >= 0.0 else -2.0
         by[6] = sign * (a * q + b * p + c * s - d * r)
         by[7] = sign * (a * r - b * s + c * p + d * q)
         by[8] = sign * (a * s + b * r - c * q + d * p)
@@ -205,11 +233,6 @@ def close(e: int, line: Line, now: Now, room: Room, kept: Kept) -> None:
         for i in range(NAVIGATION, STATES):
             by[i] = line.value[e, i] - value[i]
             value[i] = line.value[e, i]
-    keeps = kept.closed.shape[0] > 0
-    for i in range(STATES):
-        x[0, i] -= by[i]
-        if keeps:
-            kept.closed[e, i] = by[i]
 
 
 @in_place
@@ -222,36 +245,54 @@ def run_forward(
     pattern: Pattern,
     held: Int64Array,
     line: Line,
+    carries: bool,
+    solves: bool,
     begin: int,
     end: int,
     now: Now,
     room: Room,
-    kept: Kept,
+    linear: Linear,
+    solved: Solved,
 ) -> float:
     """Filter epochs ``begin`` to ``end`` (not included); return the logarithm of the likelihood.
 
-    ``room.x`` is where the prior lies from the estimate at the first epoch; behind each epoch it is zero, or where the
-    filter lies from ``line``. ``held``: states that
-    are considered and not estimated.
+    Parameters
+    ----------
+    held : ndarray of int
+        States that are considered and not estimated.
+    line : Line
+        Trajectory to linearise about; without rows: the estimate itself, which needs both parts.
+    carries, solves : bool
+        Parts to run. Without carrying, ``linear`` holds what an earlier run filled in.
+    room.x : ndarray
+        Where the prior lies from the estimate at the first epoch; behind each epoch it is zero, or where the filter
+        lies from the line.
     """
     likelihood = 0.0
     for e in range(begin, end):
-        carry(schedule.first[e], schedule.first[e + 1], imu, noise, pattern, now, room, kept)
-        if kept.F.shape[0] > 0:
-            for i in range(room.F.shape[1]):
-                kept.F[e, i] = room.F[0, i]
-            for i in range(KEPT_ROWS):
+        if carries:
+            carry(e, schedule.first[e], schedule.first[e + 1], imu, noise, now, room, linear)
+            linearise(e, schedule, seen, now, room, linear)
+            if linear.value.shape[0] > 0:
                 for j in range(STATES):
-                    kept.p[e, i, j] = now.p[i, j]
-        if kept.before.shape[0] > 0:
-            for j in range(STATES):
-                kept.value[e, j] = now.value[j]
-                kept.before[e, j] = room.x[0, j]
-        for m in range(schedule.seen[e], schedule.seen[e + 1]):
-            likelihood += update(m, 3 * m, seen, gate, held, now, room, kept)
-        if kept.after.shape[0] > 0:
-            for j in range(STATES):
-                kept.after[e, j] = room.x[0, j]
-                kept.variance[e, j] = now.p[j, j]
-        close(e, line, now, room, kept)
+                    linear.value[e, j] = now.value[j]
+        if solves:
+            predict(e, noise, pattern, now, room, linear)
+            keeps = solved.before.shape[0] > 0
+            if keeps:
+                for i in range(KEPT_ROWS):
+                    for j in range(STATES):
+                        solved.p[e, i, j] = now.p[i, j]
+                for j in range(STATES):
+                    solved.before[e, j] = room.x[0, j]
+            for m in range(schedule.seen[e], schedule.seen[e + 1]):
+                likelihood += update(m, seen, gate, held, now, room, linear, solved)
+            if keeps:
+                for j in range(STATES):
+                    solved.after[e, j] = room.x[0, j]
+                    solved.variance[e, j] = now.p[j, j]
+        if carries:
+            close(e, line, now, room, linear)
+        for j in range(STATES):
+            room.x[0, j] -= linear.closed[e, j]
     return likelihood

@@ -54,6 +54,8 @@ class Model:
         Their correlation times.
     slip_mps : float
         Sigma of the sideways and upward velocity of what rolls.
+    gyro_imperfection, accel_imperfection : float
+        Sigmas of scale factors and misalignments beside those of :class:`StartSigmas`.
     jitter_s : float
         Sigma of the stamps of GNSS against those of the unit.
     """
@@ -73,6 +75,8 @@ class Model:
     fast_s: float = 10.0
     slip_mps: float = 0.1
     jitter_s: float = 0.003
+    gyro_imperfection: float = 1.0
+    accel_imperfection: float = 1.0
 
     def noise(self, sigma_m: FloatArray) -> Noise:
         """Return the numbers as the loops take them; ``sigma_m`` (3,) is the median of the stated sigmas."""
@@ -123,15 +127,15 @@ class StartSigmas:
     lag_s: float = 0.1
     mounting_deg: float = 5.0
 
-    def variances(self, noise: Noise, *, has_latency: bool, has_slip: bool, has_baro: bool) -> FloatArray:
+    def variances(self, noise: Noise, model: Model, *, has_latency: bool, has_slip: bool, has_baro: bool) -> FloatArray:
         """Return the variances of the states from BG on, shape (STATES,); those of navigation are zero."""
         v = np.zeros(STATES)
         v[BG : BG + 3] = (self.gyro_bias_dps * DEG) ** 2
         v[BA : BA + 3] = (self.accel_bias_mg * 1e-3 * STANDARD_GRAVITY_MPS2) ** 2
-        v[SG : SG + 3] = self.gyro_scale**2
-        v[MG : MG + 6] = (self.misalignment_deg * DEG) ** 2
-        v[SA : SA + 3] = self.accel_scale**2
-        v[MA : MA + 6] = (self.accel_misalignment_deg * DEG) ** 2
+        v[SG : SG + 3] = (model.gyro_imperfection * self.gyro_scale) ** 2
+        v[MG : MG + 6] = (model.gyro_imperfection * self.misalignment_deg * DEG) ** 2
+        v[SA : SA + 3] = (model.accel_imperfection * self.accel_scale) ** 2
+        v[MA : MA + 6] = (model.accel_imperfection * self.accel_misalignment_deg * DEG) ** 2
         v[LEV : LEV + 3] = self.lever_m**2
         v[LAT] = self.latency_s**2 if has_latency else 0.0
         v[LAG] = self.lag_s**2 if has_latency else 0.0

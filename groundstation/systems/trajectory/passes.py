@@ -11,6 +11,7 @@ from groundstation.systems.trajectory.forward import BLOCK, run_forward
 from groundstation.systems.trajectory.inputs import ImuIncrements
 from groundstation.systems.trajectory.observations import Observations
 from groundstation.systems.trajectory.states import (
+    BARO,
     KEPT_ROWS,
     KINDS,
     LAT,
@@ -21,16 +22,16 @@ from groundstation.systems.trajectory.states import (
     VELOCITY,
     WIDTH,
     FloatArray,
-    BARO,
     Gate,
     Imu,
-    Kept,
     Line,
+    Linear,
     Noise,
     Now,
     Room,
     Schedule,
     Seen,
+    Solved,
     transition_pattern,
 )
 
@@ -163,7 +164,6 @@ def make_room(prior: FloatArray | None = None) -> Room:
         np.arange(STATES),
         np.zeros((3, 3)),
         np.zeros((9, LEV)),
-        np.zeros((1, ENTRIES)),
         np.zeros((STATES, STATES)),
         np.zeros(STATES),
         np.zeros(STATES),
@@ -175,37 +175,38 @@ def make_room(prior: FloatArray | None = None) -> Room:
     )
 
 
-def nothing_kept() -> Kept:
+def nothing_kept() -> Solved:
     """Return a history of no length."""
     wide = np.zeros((0, STATES))
-    return Kept(
-        np.zeros((0, 10)),
-        np.zeros((0, ENTRIES)),
-        np.zeros((0, KEPT_ROWS, STATES)),
-        *(wide for _ in range(5)),
-        np.zeros((0, WIDTH), dtype=np.int64),
-        np.zeros((0, WIDTH)),
-        wide,
-        np.zeros(0),
-        np.zeros(0),
-        np.zeros(0, dtype=np.int8),
+    none = np.zeros(0)
+    return Solved(np.zeros((0, KEPT_ROWS, STATES)), wide, wide, wide, wide, none, none, np.zeros(0, dtype=np.int8))
+
+
+def all_kept(plan: Plan) -> Solved:
+    """Return room for the history of a pass that is smoothed."""
+    epochs, scalars = len(plan.epoch_s), 3 * len(plan.seen.kind)
+    return Solved(
+        np.empty((epochs, KEPT_ROWS, STATES)),
+        *(np.empty((epochs, STATES)) for _ in range(3)),
+        np.empty((scalars, STATES)),
+        np.empty(scalars),
+        np.ones(scalars),
+        np.zeros(scalars, dtype=np.int8),
     )
 
 
-def all_kept(samples: int, epochs: int, seen: int) -> Kept:
-    """Return room for the history of a pass that is smoothed."""
-    scalars = 3 * seen
-    return Kept(
-        np.empty((samples, 10)),
+def linear_room(samples: Samples, plan: Plan) -> Linear:
+    """Return room for the linearisation of a plan."""
+    epochs, scalars = len(plan.epoch_s), 3 * len(plan.seen.kind)
+    return Linear(
+        np.empty((len(samples.time_s), 10)),
+        np.empty((epochs, STATES)),
         np.empty((epochs, ENTRIES)),
-        np.empty((epochs, KEPT_ROWS, STATES)),
-        *(np.empty((epochs, STATES)) for _ in range(5)),
+        np.empty((epochs, 4)),
+        np.empty((epochs, STATES)),
+        np.empty(scalars),
         np.zeros((scalars, WIDTH), dtype=np.int64),
         np.zeros((scalars, WIDTH)),
-        np.zeros((scalars, STATES)),
-        np.zeros(scalars),
-        np.ones(scalars),
-        np.zeros(scalars, dtype=np.int8),
     )
 
 
@@ -219,86 +220,120 @@ class Pass:
 
     Parameters
     ----------
+    linear, solved
+        Linearisation and history of the filter.
     x, variance : ndarrays, shape (e, KEPT_ROWS)
         Smoothed correction to the estimate before the measurements of each epoch, and its variance.
-    constants : ndarray, shape (STATES,)
+    constants, constants_variance : ndarrays, shape (STATES,)
         Values of the constants at the end; smoothed they are the same at all times.
-    start : Start
-        Start that the data say: estimate smoothed, covariance and prior those of the pass.
+    begun, start : Start
+        Start of the pass, and the one that the data say: estimate smoothed, covariance and prior those of the pass.
     """
 
     plan: Plan
-    kept: Kept
-    end: Now
+    linear: Linear
+    solved: Solved
     likelihood: float
     x: FloatArray
     variance: FloatArray
     constants: FloatArray
+    constants_variance: FloatArray
+    begun: Start
     start: Start
 
 
 PATTERN = transition_pattern()
 
 
-def run_pass(samples: Samples, plan: Plan, noise: Noise, gate: Gate, start: Start, line: Line = OWN_ESTIMATE) -> Pass:
-    """Filter forward over all epochs and smooth back."""
+def run_pass(
+    samples: Samples,
+    plan: Plan,
+    noise: Noise,
+    gate: Gate,
+    start: Start,
+    line: Line = OWN_ESTIMATE,
+    known: Linear | None = None,
+) -> Pass:
+    """Filter forward over all epochs and smooth back.
+
+    Parameters
+    ----------
+    line : Line
+        Trajectory that it is linearised about; its own estimate where there is none.
+    known : Linear, optional
+        Linearisation about ``line`` from an earlier pass with the same epochs: only the solving is left.
+    """
     epochs = len(plan.epoch_s)
-    kept = all_kept(len(samples.time_s), epochs, len(plan.seen.kind))
+    linear = linear_room(samples, plan) if known is None else known
+    solved = all_kept(plan)
     now, room = start.now(), make_room(start.prior)
     likelihood = run_forward(
-        samples.imu, plan.schedule, plan.seen, noise, gate, PATTERN, NOTHING_HELD, line, 0, epochs, now, room, kept
+        samples.imu,
+        plan.schedule,
+        plan.seen,
+        noise,
+        gate,
+        PATTERN,
+        NOTHING_HELD,
+        line,
+        known is None,
+        True,
+        0,
+        epochs,
+        now,
+        room,
+        linear,
+        solved,
     )
     x, variance = np.zeros((epochs, KEPT_ROWS)), np.zeros((epochs, KEPT_ROWS))
-    first = np.zeros(STATES)
+    first, square = np.zeros(STATES), [np.zeros((STATES, STATES)) for _ in range(2)]
     run_backward(
         plan.schedule,
         PATTERN,
-        kept,
+        linear,
+        solved,
         0,
         epochs,
         np.zeros(STATES),
-        np.zeros((STATES, STATES)),
-        np.zeros((STATES, STATES)),
+        square[0],
+        square[1],
         np.zeros(STATES),
         x,
         variance,
         first,
         start.p,
     )
-    x += kept.before[:, :KEPT_ROWS]
-    constants = now.value + room.x[0]
-    return Pass(plan, kept, now, likelihood, x, variance, constants, moved(start, first + start.prior))
+    x += solved.before[:, :KEPT_ROWS]
+    constants = linear.value[-1] + solved.after[-1]
+    begun = first + start.prior
+    return Pass(
+        plan, linear, solved, likelihood, x, variance, constants, solved.variance[-1], start, moved(start, begun)
+    )
 
 
-def line_of(one: Pass) -> Line:
-    """Return the smoothed trajectory of a pass, for the next to be linearised about.
-
-    Errors of GNSS and its latency are seen in straight lines: they stay at zero.
-    """
-    last = one.plan.schedule.first[1:] - 1
-    begin = one.start
-    nav = np.array(one.kept.nav[np.maximum(last, 0)])
-    nav[0] = begin.nav
-    correction = np.array(one.x[:, :NAVIGATION])
-    correction[0] = 0.0
-    north, east = curvature_radii_m(np.degrees(nav[:, 0]))
-    nav[:, 0] += correction[:, 0] / (north + nav[:, 2])
-    nav[:, 1] += correction[:, 1] / ((east + nav[:, 2]) * np.cos(nav[:, 0]))
-    nav[:, 2] -= correction[:, 2]
-    nav[:, 3:6] += correction[:, 3:6]
-    nav[:, 6:] = turned(nav[:, 6:], correction[:, 6:9])
-    value = np.tile(one.constants, (len(nav), 1))
-    value[:, NAVIGATION:KEPT_ROWS] = one.kept.value[:, NAVIGATION:KEPT_ROWS] + one.x[:, NAVIGATION:]
-    for first, end in ((LAT, MNT), (BARO, STATES)):
-        value[:, first:end] = 0.0
-    return Line(np.ascontiguousarray(nav), np.ascontiguousarray(value))
-
-
-def at_line(start: Start, line: Line) -> Start:
-    """Return a start on a line; the prior of the constants stays where it was, that of navigation comes along."""
-    prior = start.value + start.prior - line.value[0]
-    prior[:NAVIGATION] = 0.0
-    return Start(line.nav[0].copy(), line.value[0].copy(), start.p, prior)
+def likelihood_of(
+    samples: Samples, plan: Plan, noise: Noise, gate: Gate, start: Start, known: Linear, end: int | None = None
+) -> float:
+    """Return the logarithm of the likelihood of the epochs before ``end``, with a known linearisation."""
+    last = len(plan.epoch_s) if end is None else end
+    return run_forward(
+        samples.imu,
+        plan.schedule,
+        plan.seen,
+        noise,
+        gate,
+        PATTERN,
+        NOTHING_HELD,
+        OWN_ESTIMATE,
+        False,
+        True,
+        0,
+        last,
+        start.now(),
+        make_room(start.prior),
+        known,
+        nothing_kept(),
+    )
 
 
 def moved(start: Start, correction: FloatArray) -> Start:
@@ -313,7 +348,39 @@ def moved(start: Start, correction: FloatArray) -> Start:
     value, prior = start.value.copy(), start.prior.copy()
     value[NAVIGATION:] += correction[NAVIGATION:]
     prior[NAVIGATION:] -= correction[NAVIGATION:]
+    prior[:NAVIGATION] = 0.0
     return Start(nav, value, start.p, prior)
+
+
+def line_of(one: Pass) -> Line:
+    """Return the smoothed trajectory of a pass, for the next to be linearised about.
+
+    Errors of GNSS and its latency are seen in straight lines: they stay at zero.
+    """
+    last = one.plan.schedule.first[1:] - 1
+    begin = one.start
+    nav = np.array(one.linear.nav[np.maximum(last, 0)])
+    nav[0] = begin.nav
+    correction = np.array(one.x[:, :NAVIGATION])
+    correction[0] = 0.0
+    north, east = curvature_radii_m(np.degrees(nav[:, 0]))
+    nav[:, 0] += correction[:, 0] / (north + nav[:, 2])
+    nav[:, 1] += correction[:, 1] / ((east + nav[:, 2]) * np.cos(nav[:, 0]))
+    nav[:, 2] -= correction[:, 2]
+    nav[:, 3:6] += correction[:, 3:6]
+    nav[:, 6:] = turned(nav[:, 6:], correction[:, 6:9])
+    value = np.tile(one.constants, (len(nav), 1))
+    value[:, NAVIGATION:KEPT_ROWS] = one.linear.value[:, NAVIGATION:KEPT_ROWS] + one.x[:, NAVIGATION:]
+    for first, end in ((LAT, MNT), (BARO, STATES)):
+        value[:, first:end] = 0.0
+    return Line(np.ascontiguousarray(nav), np.ascontiguousarray(value))
+
+
+def at_line(start: Start, line: Line) -> Start:
+    """Return a start on a line; the prior of the constants stays where it was, that of navigation comes along."""
+    prior = start.value + start.prior - line.value[0]
+    prior[:NAVIGATION] = 0.0
+    return Start(line.nav[0].copy(), line.value[0].copy(), start.p, prior)
 
 
 def turned(quaternion: FloatArray, vector: FloatArray) -> FloatArray:

@@ -124,7 +124,6 @@ class Room(NamedTuple):
     states: Int64Array  # (STATES,) 0, 1, ...
     C: FloatArray  # (3, 3) n from b
     grown: FloatArray  # (9, LEV) transition of navigation over the epoch
-    F: FloatArray  # (1, entries)
     w: FloatArray  # (STATES, STATES)
     g: FloatArray  # (STATES,)
     K: FloatArray  # (STATES,)
@@ -142,20 +141,27 @@ class Line(NamedTuple):
     value: FloatArray  # (e or 0, STATES)
 
 
-class Kept(NamedTuple):
-    """History of a pass; arrays without length are not kept."""
+class Linear(NamedTuple):
+    """Linearisation of a log about a trajectory: transitions and rows of the measurements."""
 
     nav: FloatArray  # (n or 0, 10) estimate after each sample, before the measurements of its epoch
+    value: FloatArray  # (e or 0, STATES) values at the end of each epoch, before its measurements
     F: FloatArray  # (e, entries)
-    p: FloatArray  # (e, KEPT_ROWS, STATES) before the measurements
-    before: FloatArray  # (e, STATES) correction of the filter before the measurements of each epoch
-    after: FloatArray  # (e, STATES) and after them
-    closed: FloatArray  # (e, STATES) what of it was put into the estimate
-    value: FloatArray  # (e, STATES) values before that
-    variance: FloatArray  # (e, STATES) variances after the measurements
-    columns: Int64Array  # (s, WIDTH) of each scalar
+    spent: FloatArray  # (e, 4) time, squared rate times time, variances of gaps: angle, velocity
+    closed: FloatArray  # (e, STATES) by which the estimate was moved behind the measurements
+    z: FloatArray  # (s,) measured minus predicted of each scalar
+    columns: Int64Array  # (s, WIDTH)
     h: FloatArray  # (s, WIDTH)
+
+
+class Solved(NamedTuple):
+    """History of the filter; arrays without length are not kept."""
+
+    p: FloatArray  # (e, KEPT_ROWS, STATES) before the measurements
+    before: FloatArray  # (e, STATES) correction before the measurements of each epoch
+    after: FloatArray  # (e, STATES) and after them
+    variance: FloatArray  # (e, STATES) after the measurements
     K: FloatArray  # (s, STATES)
-    y: FloatArray  # (s,)
+    y: FloatArray  # (s,) innovation of the correction
     S: FloatArray  # (s,)
     mark: Marks  # (s,) used 1, rejected -1, absent 0

@@ -266,5 +266,5 @@ def finish_transition(nav: FloatArray, time_s: float, turn: FloatArray, grown: F
     e = 0
     for i in range(9):
         for j in range(LEV):
-            F[0, e] = grown[i, j]
+            F[e] = grown[i, j]
             e += 1

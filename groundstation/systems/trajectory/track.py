@@ -32,7 +32,7 @@ def smoothed_track(samples: Samples, one: Pass, at: Int64Array | None = None, *,
     at = output_samples(samples, int(one.plan.schedule.first[0])) if at is None else at
     epoch, share = _place(samples, one, at)
     ends = one.x[:, :NAVIGATION]
-    begins = ends - one.kept.closed[:, :NAVIGATION]
+    begins = ends - one.linear.closed[:, :NAVIGATION]
     correction = begins[epoch - 1] * (1.0 - share) + ends[epoch] * share
     variance = np.maximum(one.variance, 0.0)
     spread = variance[epoch - 1] * (1.0 - share) + variance[epoch] * share
@@ -43,11 +43,11 @@ def forward_track(samples: Samples, one: Pass, at: Int64Array | None = None, *, 
     """Return the states of the filter, which knows the past alone."""
     at = output_samples(samples, int(one.plan.schedule.first[0])) if at is None else at
     epoch, share = _place(samples, one, at)
-    before = np.diagonal(one.kept.p[:, :NAVIGATION, :NAVIGATION], axis1=1, axis2=2)
-    after = one.kept.variance[:, :NAVIGATION]
+    before = np.diagonal(one.solved.p[:, :NAVIGATION, :NAVIGATION], axis1=1, axis2=2)
+    after = one.solved.variance[:, :NAVIGATION]
     spread = after[epoch - 1] * (1.0 - share) + before[epoch] * share
-    begins = (one.kept.after - one.kept.closed)[:, :NAVIGATION]
-    correction = begins[epoch - 1] * (1.0 - share) + one.kept.before[epoch, :NAVIGATION] * share
+    begins = (one.solved.after - one.linear.closed)[:, :NAVIGATION]
+    correction = begins[epoch - 1] * (1.0 - share) + one.solved.before[epoch, :NAVIGATION] * share
     return _states(samples, one, at, correction, spread, segment)
 
 
@@ -61,7 +61,7 @@ def _place(samples: Samples, one: Pass, at: Int64Array) -> tuple[Int64Array, Flo
 def _states(
     samples: Samples, one: Pass, at: Int64Array, correction: FloatArray, variance: FloatArray, segment: int
 ) -> TrackOfStates:
-    nav = one.kept.nav[at]
+    nav = one.linear.nav[at]
     north, east = curvature_radii_m(np.degrees(nav[:, 0]))
     latitude = nav[:, 0] + correction[:, 0] / (north + nav[:, 2])
     longitude = nav[:, 1] + correction[:, 1] / ((east + nav[:, 2]) * np.cos(nav[:, 0]))
