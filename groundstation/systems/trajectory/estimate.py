@@ -50,7 +50,7 @@ from groundstation.systems.trajectory.track import angles_of, smoothed_track
 OPEN_SIGMAS, CLOSED_SIGMAS = 30.0, 5.0  # of the gate, before and after the noise is fitted
 LATENCY_ROUNDS, LATENCY_ENOUGH_S = 6, 0.003
 SETTLE_ROUNDS, LINE_ROUNDS = 3, 2
-FIT_S = 900.0  # seconds behind the first motion that the noise is fitted to
+FIT_S = 600.0  # seconds behind the first motion that the noise is fitted to
 MOVES_MPS = 1.0
 SETTLED_RAD = 5e-4  # attitude of the start against the pass before
 SLIP = Number("slip_mps", 1.0, 0.3, 20.0)

@@ -121,7 +121,7 @@ class StartSigmas:
     gyro_scale: float = 0.005
     misalignment_deg: float = 0.3
     accel_scale: float = 0.005
-    accel_misalignment_deg: float = 0.2
+    accel_misalignment_deg: float = 0.3
     lever_m: float = 1.0
     latency_s: float = 0.2
     lag_s: float = 0.1
