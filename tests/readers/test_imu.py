@@ -11,7 +11,7 @@ from groundstation.readers.ulog.canonical import IMU_ROLES, TopicRows
 from tests.readers import test_bags as bags
 from tests.readers.bag_writer import START_NS, Messages, write_ros1
 from tests.readers.dataflash_writer import DataFlash
-from tests.readers.receiver_writer import novatel, pvt, ubx_frame
+from tests.readers.receiver_writer import novatel, novatel_text, pvt, ubx_frame
 from tests.readers.telemetry_writer import Telemetry
 from tests.readers.test_dataflash import Log
 from tests.readers.test_receiver import Read as ReceiverRead
@@ -314,3 +314,56 @@ def test_recorded_logs(name: str, topic: str, rows: int, field: str) -> None:
         if getattr(item, "columns", None) is not None and item.topic == topic:
             count += int(item.columns[field].mask.sum())
     assert count == rows
+
+
+def raw_imu(name: str, seconds: float, unit: int = 41, status: int = 4, **counts: int) -> bytes:
+    stated = {"imu_status_info": status, "imu_type": unit} if name.endswith("X") else {}
+    is_short = name in ("RAWIMUS", "RAWIMUSX")
+    return novatel(name, round(1000.0 * seconds), is_short=is_short, week=2417, seconds=seconds, **stated, **counts)
+
+
+COUNTS = dict(
+    zip([f"del_{what}_body_{axis}" for what in ("vel", "ang") for axis in "zyx"], (1, 2, 3, 4, 5, 6), strict=True)
+)
+
+
+@pytest.mark.parametrize("name", ["RAWIMUX", "RAWIMUSX"])
+def test_novatel_counts_are_scaled_by_the_type_and_turned(tmp_path: Path, name: str) -> None:
+    found = ReceiverRead(tmp_path, b"".join(raw_imu(name, 100.0 + 0.005 * at, 58, **COUNTS) for at in range(8)))
+    velocity, angle = 2.0**-29, 2.0**-33  # HG4930
+    expected = {"delta_velocity_x_mps": -2 * velocity, "delta_velocity_y_mps": 3 * velocity}
+    expected |= {"delta_velocity_z_mps": -1 * velocity, "delta_angle_x_rad": -5 * angle}
+    expected |= {"delta_angle_y_rad": 6 * angle, "delta_angle_z_rad": -4 * angle}
+    for field, value in expected.items():
+        assert found.values("imu", field)[0] == pytest.approx(value, rel=SINGLE), field
+    assert set(found.values("imu", "is_integral")) == {True} and "interval_s" not in found.batches("imu")[0].columns
+    assert [time[20:29] for time in found.times("imu")[:3]] == ["000000000", "005000000", "010000000"]
+    assert any("HG4930 AN01" in getattr(one, "text", "") for one in found.items)
+
+
+def test_novatel_example_of_the_manual_shows_gravity(tmp_path: Path) -> None:
+    """RAWIMUSX, ASCII example of the OEM7 manual: an EPSON G320N, 125 Hz, that stands."""
+    body = "04,41,2209,491674.013699,ea59fe00,329308016,-2706935,4508389,196192,417138,-1000837"
+    content = novatel_text("RAWIMUSXA,2209,491674.014", body, "%") * 4
+    found = ReceiverRead(tmp_path, content)
+    force = [125.0 * found.values("imu", f"delta_velocity_{axis}_mps")[0] for axis in "xyz"]
+    assert force[2] == pytest.approx(-9.856, abs=1e-3) and np.linalg.norm(force) == pytest.approx(9.858, abs=2e-3)
+    assert force[0] == pytest.approx(0.0810, abs=1e-4) and force[1] == pytest.approx(0.1349, abs=1e-4)
+    rate = [125.0 * np.rad2deg(found.values("imu", f"delta_angle_{axis}_rad")[0]) for axis in "xyz"]
+    assert rate == pytest.approx([-0.0509, -0.1222, -0.0239], abs=1e-4)
+
+
+def test_novatel_units_that_are_not_known_and_counts_that_are_none(tmp_path: Path) -> None:
+    content = b"".join(raw_imu("RAWIMUX", 100.0 + at, **COUNTS) for at in range(4))
+    content += raw_imu("RAWIMUX", 104.0, 47, **COUNTS) + raw_imu("RAWIMUX", 105.0, status=1, **COUNTS)
+    content += raw_imu("RAWIMUX", 106.0, status=2, **COUNTS)
+    found = ReceiverRead(tmp_path, content)
+    assert len(found.values("imu", "delta_angle_x_rad")) == 4 and len(found.values("raw.RAWIMUX", "imu_type")) == 7
+    assert any("of a unit of type 47" in getattr(one, "text", "") for one in found.items)
+
+
+@pytest.mark.parametrize("name", ["RAWIMU", "RAWIMUS"])
+def test_novatel_counts_without_a_type_stay_raw(tmp_path: Path, name: str) -> None:
+    found = ReceiverRead(tmp_path, b"".join(raw_imu(name, 100.0 + at, **COUNTS) for at in range(8)))
+    assert not found.batches("imu") and found.values(f"raw.{name}", "del_ang_body_x") == [6.0] * 8
+    assert any(f"{name} (8) stays raw" in getattr(one, "text", "") for one in found.items)
