@@ -270,6 +270,49 @@ def test_ublox_measurements_by_their_counter(tmp_path: Path) -> None:
     )
 
 
+def raw_sensors(start_ms: int, tag: int, samples: int) -> bytes:
+    """ESF-RAW with several samples of six sensors, 10 ms (256 ticks) apart."""
+    body = struct.pack("<I", start_ms)
+    for number in range(samples):
+        values = ((14, 4096 + number), (13, -4096), (5, 8192), (16, 1024), (17, 0), (18, -10 * 1024))
+        for kind, value in values:
+            body += struct.pack("<II", (value & 0xFFFFFF) | kind << 24, (tag + 256 * number) % (1 << 24))
+    return ubx_frame(0x1003, body)
+
+
+def test_ublox_raw_samples_by_milliseconds_and_the_counter_of_the_sensor(tmp_path: Path) -> None:
+    content, tag = b"", (1 << 24) - 700  # the counter runs over within the first message
+    for second in range(3):
+        content += pvt(f"2026-05-04T12:00:{second:02d}Z")
+        for part in range(10):
+            content += raw_sensors(5_000 + second * 1_000 + part * 100 + 60, tag % (1 << 24), 10)
+            tag += 2_560
+    found = ReceiverRead(tmp_path, content)
+    rates = found.values("imu", "rate_x_dps")
+    assert len(rates) == 300 and rates[1] == pytest.approx(4097 / 4096, rel=SINGLE)
+    assert found.values("imu", "rate_y_dps")[0] == -1.0 and found.values("imu", "accel_z_mps2")[-1] == -10.0
+    times = found.times("imu")
+    assert times[:3] == [f"2026-05-04T12:00:00.0{at}0000000Z" for at in range(3)]
+    assert times[-1] == "2026-05-04T12:00:02.990000000Z" and len(set(times)) == 300
+
+
+def test_ublox_raw_samples_without_milliseconds_stay_raw(tmp_path: Path) -> None:
+    content = pvt("2026-05-04T12:00:00Z") + b"".join(raw_sensors(0, 2_560 * at, 10) for at in range(10))
+    found = ReceiverRead(tmp_path, content)
+    assert not found.batches("imu") and len(found.values("raw.ESF-RAW.group", "sTtag")) == 600
+    assert any("no milliseconds" in getattr(one, "text", "") for one in found.items)
+
+
+def test_ublox_message_with_more_samples_gives_the_unit(tmp_path: Path) -> None:
+    content = b""
+    for second in range(3):
+        content += pvt(f"2026-05-04T12:00:{second:02d}Z") + raw_sensors(5_060 + second * 1_000, 2_560 * second, 10)
+        content += measured(5_060 + second * 1_000, (14, 4096), (13, -4096), (5, 8192))
+    found = ReceiverRead(tmp_path, content)
+    assert len(found.values("imu", "rate_x_dps")) == 30
+    assert any("ESF-MEAS (3) stays raw: ESF-RAW has more" in getattr(one, "text", "") for one in found.items)
+
+
 def test_novatel_without_gravity_is_no_specific_force(tmp_path: Path) -> None:
     content = b"".join(
         novatel("CORRIMUDATA", 1_000 * at, week=2417, seconds=at, corr_accel_z=0.1) for at in range(1, 9)

@@ -100,7 +100,7 @@ def _of_block(
     if gnss is not None:
         tally.add_fixes(gnss)
         yield from bounded(gnss)
-    inertial = ubx_inertial.imu_batch(block, counter, found.anchors)
+    inertial = ubx_inertial.imu_batch(block, found.sensors, counter, found.anchors) if found.sensors else None
     if inertial is not None:
         yield from bounded(inertial)
     increments = novatel_inertial.imu_batch(block, found.inertial) if found.inertial else None
