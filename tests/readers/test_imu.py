@@ -1,6 +1,5 @@
 """Topic `imu` of every reader: which source is taken, its units, its times, and what it says of them."""
 
-import struct
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ from groundstation.readers.ulog.canonical import IMU_ROLES, TopicRows
 from tests.readers import test_bags as bags
 from tests.readers.bag_writer import START_NS, Messages, write_ros1
 from tests.readers.dataflash_writer import DataFlash
-from tests.readers.receiver_writer import novatel, novatel_text, pvt, ubx_frame
+from tests.readers.receiver_writer import COUNTS, measured, novatel, novatel_text, pvt, raw_imu, raw_sensors
 from tests.readers.telemetry_writer import Telemetry
 from tests.readers.test_dataflash import Log
 from tests.readers.test_receiver import Read as ReceiverRead
@@ -243,12 +242,6 @@ def test_ros_samples_are_turned_and_each_unit_is_a_topic(tmp_path: Path) -> None
     assert "rate_x_dps" in flight["ins.1"].columns, "what scripts read of `ins` stays"
 
 
-def measured(tick_ms: int, *values: tuple[int, int]) -> bytes:
-    """ESF-MEAS with values of some types."""
-    words = b"".join(struct.pack("<I", (value & 0xFFFFFF) | kind << 24) for kind, value in values)
-    return ubx_frame(0x1002, struct.pack("<IHH", tick_ms, len(values) << 11, 0) + words)
-
-
 def test_ublox_measurements_by_their_counter(tmp_path: Path) -> None:
     content = b""
     for second in range(3):
@@ -268,16 +261,6 @@ def test_ublox_measurements_by_their_counter(tmp_path: Path) -> None:
         for one in found.items
         if getattr(one, "topic", "") == "imu" and hasattr(one, "code")
     )
-
-
-def raw_sensors(start_ms: int, tag: int, samples: int) -> bytes:
-    """ESF-RAW with several samples of six sensors, 10 ms (256 ticks) apart."""
-    body = struct.pack("<I", start_ms)
-    for number in range(samples):
-        values = ((14, 4096 + number), (13, -4096), (5, 8192), (16, 1024), (17, 0), (18, -10 * 1024))
-        for kind, value in values:
-            body += struct.pack("<II", (value & 0xFFFFFF) | kind << 24, (tag + 256 * number) % (1 << 24))
-    return ubx_frame(0x1003, body)
 
 
 def test_ublox_raw_samples_by_milliseconds_and_the_counter_of_the_sensor(tmp_path: Path) -> None:
@@ -357,17 +340,6 @@ def test_recorded_logs(name: str, topic: str, rows: int, field: str) -> None:
         if getattr(item, "columns", None) is not None and item.topic == topic:
             count += int(item.columns[field].mask.sum())
     assert count == rows
-
-
-def raw_imu(name: str, seconds: float, unit: int = 41, status: int = 4, **counts: int) -> bytes:
-    stated = {"imu_status_info": status, "imu_type": unit} if name.endswith("X") else {}
-    is_short = name in ("RAWIMUS", "RAWIMUSX")
-    return novatel(name, round(1000.0 * seconds), is_short=is_short, week=2417, seconds=seconds, **stated, **counts)
-
-
-COUNTS = dict(
-    zip([f"del_{what}_body_{axis}" for what in ("vel", "ang") for axis in "zyx"], (1, 2, 3, 4, 5, 6), strict=True)
-)
 
 
 @pytest.mark.parametrize("name", ["RAWIMUX", "RAWIMUSX"])
