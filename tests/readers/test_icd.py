@@ -31,6 +31,7 @@ from groundstation.readers.icd import (
     usable_1553,
     word_values,
 )
+from groundstation.readers.icd.model import Element
 from groundstation.readers.icd.signals import by_name
 from groundstation.readers.icd.yaml_text import parse_yaml
 from tests.real_logs import real_log
