@@ -4,13 +4,16 @@
 profile's raw topic.
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+
 from groundstation.base.errors import UnreadableLogError
-from groundstation.base.records import Damage, Item, LogHeader, Remark
+from groundstation.base.records import Damage, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.slips import slips
 from groundstation.base.source_units import PREFIX, units_entry
 from groundstation.readers.dialect import DELIMITERS, Dialect, HeadLine, detect_encoding, head_lines
@@ -18,6 +21,7 @@ from groundstation.readers.misnamed import misnamed
 from groundstation.readers.profile import Profile, load, shipped
 from groundstation.readers.profile_fit import Fit, delimiter_of, fit_at, fit_below
 from groundstation.readers.profile_layout import layout_of
+from groundstation.readers.rtklib_tag import TaggedClock, clock_by_tag
 from groundstation.readers.sections import MOST, TableSection, header_places, left_out, mark_of, told
 from groundstation.readers.source import Claim, Source
 from groundstation.readers.start import unusable_references, utc_of_zero
@@ -28,6 +32,7 @@ _HEAD_LINES = 1000
 DAMAGED_HEAD_LINES = 20  # lines searched for a header row when the first line is not the profile's
 MOST_LINES = 10_000  # lines searched for it otherwise
 _OF_NUMBERS = frozenset(b"%c" % sign for sign in b"0123456789+-.,;")
+_COMMENTS = re.compile(r"\A(?:#[^\n]*\n\s*)+")
 FEWEST_ROWS = 3  # above the header row that are those of another log
 
 
@@ -51,6 +56,7 @@ def _best(source: Source) -> tuple[float, Fit] | None:
     """Return the shipped profile that fits a file, and how sure that is."""
     first = source.head[:4096].removeprefix(b"\xef\xbb\xbf").decode("utf-8", errors="replace").lstrip()
     profiles = [profile for profile in _shipped() if profile.first_lines]
+    row = _COMMENTS.sub("", first)  # the first line that is none of the metadata above a header
     is_one = any(first.startswith(profile.first_lines) for profile in profiles)
     encoding = detect_encoding(source.head, source.name)
     below = (
@@ -60,7 +66,7 @@ def _best(source: Source) -> tuple[float, Fit] | None:
     lines = head_lines(source, encoding, most)
     found: list[tuple[float, Fit]] = []
     for profile in profiles:
-        is_its_own = first.startswith(profile.first_lines)
+        is_its_own = first.startswith(profile.first_lines) or row.startswith(profile.first_lines)
         is_near = not is_its_own and profile.name not in below
         fit = _fit(profile, encoding, lines[:DAMAGED_HEAD_LINES] if is_near else lines)
         count = 0 if fit is None else sum(rule.name in fit.position for rule in profile.columns)
@@ -118,6 +124,10 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
         fit = found[1]
     metadata = _metadata(fit)
     utc_of_zero_ns, remarks = _utc_of_zero(fit, metadata)
+    clock: TaggedClock | None = None
+    if fit.profile.time.has_tag and fit.last.ended:
+        clock, remarks = _clock_by_tag(source, fit)
+        utc_of_zero_ns = utc_of_zero_ns if clock is None else clock.utc_of_zero_ns
     header = LogHeader(f"{NAME} {fit.profile.name}", metadata, utc_of_zero_ns)
     if not fit.last.ended:
         yield header
@@ -131,7 +141,18 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
     yield next(items)
     yield from dict.fromkeys([*remarks, *section_remarks, *unusable_references(metadata)])
     yield from () if above else _above(fit)
-    yield from misnamed(items, _slips(fit), fit.header.number)
+    for item in misnamed(items, _slips(fit), fit.header.number):
+        yield item if clock is None or not isinstance(item, RecordBatch) else _undrifted(item, clock)
+
+
+def _clock_by_tag(source: Source, fit: Fit) -> tuple[TaggedClock | None, list[Remark]]:
+    layout, _remarks = layout_of(fit, source, None, None)
+    return clock_by_tag(source, fit.dialect_to(None), layout)
+
+
+def _undrifted(batch: RecordBatch, clock: TaggedClock) -> RecordBatch:
+    """Return a batch with times of validity by the host's clock."""
+    return replace(batch, validity_time_ns=clock.validity_ns(batch.device_time_ns.values.astype(np.int64)))
 
 
 def _rows_of_another(fit: Fit) -> Dialect | None:

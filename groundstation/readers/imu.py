@@ -76,6 +76,20 @@ def increments(
     return columns
 
 
+def integrals(angles_rad: Sequence[NDArray[Any]], velocities_mps: Sequence[NDArray[Any]]) -> dict[str, Column]:
+    """Return columns of increments since the record before, each: their interval is not told.
+
+    Examples
+    --------
+    >>> zero = np.zeros(1)
+    >>> list(integrals((zero, zero, zero), (zero, zero, zero)))[-2:]
+    ['delta_velocity_z_mps', 'is_integral']
+    """
+    columns = {name: _single(values, None) for name, values in zip(ANGLES, angles_rad, strict=True)}
+    columns |= {name: _single(values, None) for name, values in zip(VELOCITIES, velocities_mps, strict=True)}
+    return columns | {"is_integral": Column(np.ones(len(angles_rad[0]), dtype=bool))}
+
+
 def samples(columns: Mapping[str, Column]) -> dict[str, Column]:
     """Return columns of samples: rates and specific force, each marked as no increment."""
     found = {name: _single(one.values, one.present) for name, one in columns.items()}

@@ -76,7 +76,7 @@ class TimeColumns:
 
     The kinds are those of :class:`groundstation.readers.layout.TimeRule`.
 
-    ``is_utc``: date and time of kind ``local`` are UTC.
+    ``is_utc``: date and time of kind ``local`` are UTC. ``has_tag``: a time tag of RTKLIB beside the file tells UTC.
     """
 
     kind: str
@@ -84,6 +84,7 @@ class TimeColumns:
     unit: tuple[int, int] = TIME_UNITS["s"]
     date_formats: tuple[str, ...] = ()
     is_utc: bool = False
+    has_tag: bool = False
 
 
 @dataclass(frozen=True)
@@ -310,12 +311,13 @@ class _Checker(Checker):
             self.fail("time.kind", repr(kind), f"one of {', '.join(kinds)}")
         if kind == "local":
             return self.local_time(table)
-        allowed = ("kind", "column", "unit") if kind == "seconds" else ("kind", "column")
+        allowed = ("kind", "column", "unit", "rtklib_tag") if kind == "seconds" else ("kind", "column")
         self.table(table, "time", allowed, ("column",))
         unit = table.get("unit", "s")
         if not isinstance(unit, str) or unit not in TIME_UNITS:
             self.fail("time.unit", repr(unit), f"one of {', '.join(TIME_UNITS)}")
-        return TimeColumns(kind, (self.text(table["column"], "time.column"),), TIME_UNITS[unit])
+        has_tag = self.flag(table.get("rtklib_tag", False), "time.rtklib_tag")
+        return TimeColumns(kind, (self.text(table["column"], "time.column"),), TIME_UNITS[unit], has_tag=has_tag)
 
     def local_time(self, table: dict[str, Any]) -> TimeColumns:
         self.table(table, "time", ("kind", "date", "time", "offset", "date_formats"), ("date", "time"))
@@ -330,7 +332,8 @@ class _Checker(Checker):
         return TimeColumns("local", tuple(names), date_formats=formats, is_utc=is_utc)
 
     def columns(self, value: Any) -> tuple[ColumnRule, ...]:
-        rules: dict[str, ColumnRule] = {}
+        rules: list[ColumnRule] = []
+        feeding: dict[str, ColumnRule] = {}
         for name, entry in self.table(value, "columns", ()).items():
             key = f"columns.{name}"
             allowed = ("field", "unit", "scale", "sign", "offset", "north", "optional")
@@ -341,11 +344,13 @@ class _Checker(Checker):
             if north and known.name not in DIRECTIONS:
                 self.fail(f"{key}.north", known.name, f"one of {', '.join(DIRECTIONS)}")
             target = f"{topic}.{known.name}"
-            if target in rules:
-                self.fail(f"{key}.field", target, f"a field that {rules[target].name!r} does not feed already")
-            rule = self.column(name, key, topic, known, table)
-            rules[target] = replace(rule, north=north, is_optional=is_optional)
-        return tuple(rules.values())
+            other = feeding.get(target)
+            if other is not None and not (is_optional and other.is_optional):
+                self.fail(f"{key}.field", target, f"a field that {other.name!r} does not feed already")
+            rule = replace(self.column(name, key, topic, known, table), north=north, is_optional=is_optional)
+            feeding.setdefault(target, rule)
+            rules.append(rule)
+        return tuple(rules)
 
     def north(self, value: Any, key: str) -> str:
         if value not in ("", "true", "magnetic"):

@@ -95,6 +95,11 @@ class TableReader:
             return self._time(self._arrays(block), block.line_numbers)
         return Column(np.zeros(0, dtype=np.int64))
 
+    def times(self) -> Iterator[tuple[Int64Array, Column]]:
+        """Line numbers and times of the rows of the first section, block by block."""
+        for block in RowScanner(self._source, self._dialect, Losses()):
+            yield block.line_numbers, self._time(self._arrays(block), block.line_numbers)
+
     def _settled(self, sections: Sequence[TableSection]) -> tuple[TableSection, ...]:
         """Settle columns of kind ``raw``: float64 where every cell is a number, else text.
 
@@ -326,6 +331,12 @@ def first_times(source: Source, dialect: Dialect, layout: TableLayout) -> tuple[
     """
     reader = TableReader(source, [TableSection(dialect, replace(layout, rules=(), derivations=()))])
     return reader.first_times(), reader.zoneless
+
+
+def all_times(source: Source, section: TableSection) -> Iterator[tuple[Int64Array, Column]]:
+    """Line numbers and times of the rows of a section, block by block."""
+    bare = replace(section, layout=replace(section.layout, rules=(), derivations=()))
+    yield from TableReader(source, [bare]).times()
 
 
 def truncated_header(line: int) -> Damage:

@@ -18,7 +18,14 @@ from tests.readers.bag_writer import write_ros1, write_ros2
 from tests.readers.dataflash_writer import MAGIC as DATAFLASH_MAGIC
 from tests.readers.dataflash_writer import flight_log
 from tests.readers.flightdata_writer import write_flightdata
-from tests.readers.receiver_writer import nmea_log, novatel_log, novatel_text_log, ubx_log
+from tests.readers.receiver_writer import (
+    nmea_log,
+    novatel_imu_log,
+    novatel_log,
+    novatel_text_log,
+    ubx_imu_log,
+    ubx_log,
+)
 from tests.readers.telemetry_writer import telemetry
 from tests.readers.trajectory_writer import PLACE, VELOCITY, pos_rows, sbet
 from tests.readers.ulog_writer import GPS, GPS_CODE, small_flight
@@ -273,9 +280,9 @@ _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
     "robot-mcap": (lambda: _bag("mcap"),),
     "ros1": (lambda: _bag("ros1"),),
     "sqlite3": (lambda: _bag("sqlite3"),),
-    "ubx": (ubx_log,),
+    "ubx": (ubx_log, ubx_imu_log),
     "nmea": (nmea_log,),
-    "novatel": (novatel_log,),
+    "novatel": (novatel_log, novatel_imu_log),
     "novatel-text": (novatel_text_log,),
     "flatbuffer": (flatbuffer,),
     "pos": (pos,),

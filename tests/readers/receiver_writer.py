@@ -108,6 +108,59 @@ def rmc(time: str, date: str, speed_mps: float = 10.0, track_deg: float = 90.0, 
     return nmea(f"GNRMC,{time},{status},5130.00000,N,00042.00000,W,{knots:.9f},{track_deg:.4f},{date},,,A")
 
 
+def measured(tick_ms: int, *values: tuple[int, int]) -> bytes:
+    """ESF-MEAS with values of some types."""
+    words = b"".join(struct.pack("<I", (value & 0xFFFFFF) | kind << 24) for kind, value in values)
+    return ubx_frame(0x1002, struct.pack("<IHH", tick_ms, len(values) << 11, 0) + words)
+
+
+def raw_sensors(start_ms: int, tag: int, samples: int) -> bytes:
+    """ESF-RAW with several samples of six sensors, 10 ms (256 ticks) apart."""
+    body = struct.pack("<I", start_ms)
+    for number in range(samples):
+        values = ((14, 4096 + number), (13, -4096), (5, 8192), (16, 1024), (17, 0), (18, -10 * 1024))
+        for kind, value in values:
+            body += struct.pack("<II", (value & 0xFFFFFF) | kind << 24, (tag + 256 * number) % (1 << 24))
+    return ubx_frame(0x1003, body)
+
+
+def raw_imu(name: str, seconds: float, unit: int = 41, status: int = 4, **counts: int) -> bytes:
+    stated = {"imu_status_info": status, "imu_type": unit} if name.endswith("X") else {}
+    is_short = name in ("RAWIMUS", "RAWIMUSX")
+    return novatel(name, round(1000.0 * seconds), is_short=is_short, week=2417, seconds=seconds, **stated, **counts)
+
+
+COUNTS = dict(
+    zip([f"del_{what}_body_{axis}" for what in ("vel", "ang") for axis in "zyx"], (1, 2, 3, 4, 5, 6), strict=True)
+)
+
+
+def ubx_imu_log(seconds: int = 30) -> bytes:
+    """A stream of UBX with both messages of a receiver's own sensors, some 40 kB."""
+    log = b""
+    for at in range(seconds):
+        log += pvt(f"2026-05-04T12:00:{at:02d}Z")
+        for part in range(4):
+            start_ms = 5_060 + 1_000 * at + 250 * part
+            log += measured(start_ms, (14, 40 * at), (13, -part), (5, 8192), (16, 1024), (17, 7), (18, -10 * 1024))
+            log += raw_sensors(start_ms, (1 << 23) + 6_400 * (4 * at + part), 4)
+    return log
+
+
+def novatel_imu_log(seconds: int = 30) -> bytes:
+    """A stream of NovAtel with the counts of its inertial unit, in binary and as text, some 40 kB."""
+    log = b""
+    for at in range(seconds):
+        seconds_of_week = 129_618.0 + at
+        log += novatel("BESTPOS", 1_000 * (129_618 + at), latitude=51.5, longitude=at / 1e4, num_soln_svs=9)
+        for part in range(10):
+            name = "RAWIMUX" if part == 9 else "RAWIMUS" if part == 8 else "RAWIMUSX"
+            log += raw_imu(name, seconds_of_week + 0.1 * part, 58, **(COUNTS | {"del_ang_body_z": 100 * at}))
+        time = f"2417,{seconds_of_week:.3f}"
+        log += novatel_text(f"RAWIMUSXA,{time}", f"00,41,{time}000,ea59fe00,329308016,-2706935,4508389,1,2,-3", "%")
+    return log
+
+
 def ubx_log(seconds: int = 120) -> bytes:
     """A stream of UBX with everything between, some 40 kB."""
     log = b""

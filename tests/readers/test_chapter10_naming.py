@@ -117,6 +117,40 @@ def bnr(value: float, full_scale: float) -> int:
     return round(value / full_scale * 2**18) & 0x7FFFF
 
 
+AXES_429 = (  # label, full scale, value: rates in deg/s, accelerations in g
+    *((0o327, 128, 3.0), (0o326, 128, -2.0), (0o330, 128, 10.0)),
+    *((0o331, 4, 0.125), (0o332, 4, -0.25), (0o333, 4, 1.0)),
+)
+
+
+def body_words(samples: int, left_out: int = -1, of: tuple[tuple[int, int, float], ...] = AXES_429) -> bytes:
+    """Body rates and accelerations of an inertial reference, 50 Hz; one sample may lack its last word."""
+    words = []
+    for at in range(samples):
+        for number, (label, full, value) in enumerate(of):
+            if at != left_out or number < len(of) - 1:
+                bits = round(value / full * 2**18) & 0x7FFFF & ~(0x3F if full == 4 else 0x1F)
+                words.append((0, 200_000 if not number else 2_000, made.word_429(label, bits)))
+    return made.packet(7, 0x38, made.words_429(words), 0)
+
+
+def test_body_rates_and_accelerations_are_an_inertial_unit(tmp_path: Path) -> None:
+    items = read(tmp_path, body_words(5, left_out=2), shipped("arinc429_inertial"))
+    found = rows(items, "imu")
+    assert len(found["rate_x_dps"]) == 4 and not found["is_integral"].any()
+    rates = [found[f"rate_{axis}_dps"][0] for axis in "xyz"]
+    forces = [found[f"accel_{axis}_mps2"][0] for axis in "xyz"]
+    np.testing.assert_allclose(rates, [3.0, -2.0, 10.0], atol=128 / 2**13)
+    np.testing.assert_allclose(forces, np.array([0.125, -0.25, -1.0]) * 9.80665, atol=9.80665 * 4 / 2**12)
+    assert any("imu from the body rates and accelerations of ins" in text for text in texts(items, "mapped"))
+    assert "rate_x_dps" in rows(items, "ins"), "what scripts read of `ins` stays"
+
+
+def test_rates_without_accelerations_are_no_unit(tmp_path: Path) -> None:
+    items = read(tmp_path, body_words(5, of=AXES_429[:5]), shipped("arinc429_inertial"))
+    assert not [item for item in items if isinstance(item, RecordBatch) and item.topic == "imu"]
+
+
 def test_429_words_that_belong_together(tmp_path: Path) -> None:
     """One sample at the time of its first word; velocities from track and speed; no computed data is absent."""
     gap = 4_000

@@ -31,6 +31,8 @@ from groundstation.readers.icd import (
     usable_1553,
     word_values,
 )
+from groundstation.readers.icd.model import Element
+from groundstation.readers.icd.signals import by_name
 from groundstation.readers.icd.yaml_text import parse_yaml
 from tests.real_logs import real_log
 
@@ -480,3 +482,18 @@ def test_an_element_kept_from_its_name_stays_so(tmp_path: Path) -> None:
     found = icd(tmp_path, MESSAGE.replace('uom: "deg"', 'uom: "deg", signal: ""'))
     assert found.messages_1553[0].elements[0].signal is None
     assert icd(tmp_path, to_yaml(found)).messages_1553 == found.messages_1553
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "signal", "factor"),
+    [
+        ("body_roll_rate", "deg/s", "ins.rate_x_dps", 1.0),
+        ("body_yaw_rate", "rad/s", "ins.rate_z_dps", 57.29577951308232),
+        ("body longitudinal acceleration", "g", "ins.accel_x_mps2", 9.80665),
+        ("body_lateral_acceleration", "ft/s^2", "ins.accel_y_mps2", 0.3048),
+        ("body_normal_acceleration", "g", "ins.accel_z_mps2", -9.80665),
+    ],
+)
+def test_body_rates_and_accelerations_by_name(name: str, unit: str, signal: str, factor: float) -> None:
+    element = by_name(Element(name, "SIGNED16", 64.0, unit), ["EGI"])
+    assert element.signal == signal and element.factor == pytest.approx(factor, rel=1e-12)

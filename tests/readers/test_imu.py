@@ -1,6 +1,5 @@
 """Topic `imu` of every reader: which source is taken, its units, its times, and what it says of them."""
 
-import struct
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ from groundstation.readers.ulog.canonical import IMU_ROLES, TopicRows
 from tests.readers import test_bags as bags
 from tests.readers.bag_writer import START_NS, Messages, write_ros1
 from tests.readers.dataflash_writer import DataFlash
-from tests.readers.receiver_writer import novatel, pvt, ubx_frame
+from tests.readers.receiver_writer import COUNTS, measured, novatel, novatel_text, pvt, raw_imu, raw_sensors
 from tests.readers.telemetry_writer import Telemetry
 from tests.readers.test_dataflash import Log
 from tests.readers.test_receiver import Read as ReceiverRead
@@ -243,12 +242,6 @@ def test_ros_samples_are_turned_and_each_unit_is_a_topic(tmp_path: Path) -> None
     assert "rate_x_dps" in flight["ins.1"].columns, "what scripts read of `ins` stays"
 
 
-def measured(tick_ms: int, *values: tuple[int, int]) -> bytes:
-    """ESF-MEAS with values of some types."""
-    words = b"".join(struct.pack("<I", (value & 0xFFFFFF) | kind << 24) for kind, value in values)
-    return ubx_frame(0x1002, struct.pack("<IHH", tick_ms, len(values) << 11, 0) + words)
-
-
 def test_ublox_measurements_by_their_counter(tmp_path: Path) -> None:
     content = b""
     for second in range(3):
@@ -268,6 +261,39 @@ def test_ublox_measurements_by_their_counter(tmp_path: Path) -> None:
         for one in found.items
         if getattr(one, "topic", "") == "imu" and hasattr(one, "code")
     )
+
+
+def test_ublox_raw_samples_by_milliseconds_and_the_counter_of_the_sensor(tmp_path: Path) -> None:
+    content, tag = b"", (1 << 24) - 700  # the counter runs over within the first message
+    for second in range(3):
+        content += pvt(f"2026-05-04T12:00:{second:02d}Z")
+        for part in range(10):
+            content += raw_sensors(5_000 + second * 1_000 + part * 100 + 60, tag % (1 << 24), 10)
+            tag += 2_560
+    found = ReceiverRead(tmp_path, content)
+    rates = found.values("imu", "rate_x_dps")
+    assert len(rates) == 300 and rates[1] == pytest.approx(4097 / 4096, rel=SINGLE)
+    assert found.values("imu", "rate_y_dps")[0] == -1.0 and found.values("imu", "accel_z_mps2")[-1] == -10.0
+    times = found.times("imu")
+    assert times[:3] == [f"2026-05-04T12:00:00.0{at}0000000Z" for at in range(3)]
+    assert times[-1] == "2026-05-04T12:00:02.990000000Z" and len(set(times)) == 300
+
+
+def test_ublox_raw_samples_without_milliseconds_stay_raw(tmp_path: Path) -> None:
+    content = pvt("2026-05-04T12:00:00Z") + b"".join(raw_sensors(0, 2_560 * at, 10) for at in range(10))
+    found = ReceiverRead(tmp_path, content)
+    assert not found.batches("imu") and len(found.values("raw.ESF-RAW.group", "sTtag")) == 600
+    assert any("no milliseconds" in getattr(one, "text", "") for one in found.items)
+
+
+def test_ublox_message_with_more_samples_gives_the_unit(tmp_path: Path) -> None:
+    content = b""
+    for second in range(3):
+        content += pvt(f"2026-05-04T12:00:{second:02d}Z") + raw_sensors(5_060 + second * 1_000, 2_560 * second, 10)
+        content += measured(5_060 + second * 1_000, (14, 4096), (13, -4096), (5, 8192))
+    found = ReceiverRead(tmp_path, content)
+    assert len(found.values("imu", "rate_x_dps")) == 30
+    assert any("ESF-MEAS (3) stays raw: ESF-RAW has more" in getattr(one, "text", "") for one in found.items)
 
 
 def test_novatel_without_gravity_is_no_specific_force(tmp_path: Path) -> None:
@@ -314,3 +340,45 @@ def test_recorded_logs(name: str, topic: str, rows: int, field: str) -> None:
         if getattr(item, "columns", None) is not None and item.topic == topic:
             count += int(item.columns[field].mask.sum())
     assert count == rows
+
+
+@pytest.mark.parametrize("name", ["RAWIMUX", "RAWIMUSX"])
+def test_novatel_counts_are_scaled_by_the_type_and_turned(tmp_path: Path, name: str) -> None:
+    found = ReceiverRead(tmp_path, b"".join(raw_imu(name, 100.0 + 0.005 * at, 58, **COUNTS) for at in range(8)))
+    velocity, angle = 2.0**-29, 2.0**-33  # HG4930
+    expected = {"delta_velocity_x_mps": -2 * velocity, "delta_velocity_y_mps": 3 * velocity}
+    expected |= {"delta_velocity_z_mps": -1 * velocity, "delta_angle_x_rad": -5 * angle}
+    expected |= {"delta_angle_y_rad": 6 * angle, "delta_angle_z_rad": -4 * angle}
+    for field, value in expected.items():
+        assert found.values("imu", field)[0] == pytest.approx(value, rel=SINGLE), field
+    assert set(found.values("imu", "is_integral")) == {True} and "interval_s" not in found.batches("imu")[0].columns
+    assert [time[20:29] for time in found.times("imu")[:3]] == ["000000000", "005000000", "010000000"]
+    assert any("HG4930 AN01" in getattr(one, "text", "") for one in found.items)
+
+
+def test_novatel_example_of_the_manual_shows_gravity(tmp_path: Path) -> None:
+    """RAWIMUSX, ASCII example of the OEM7 manual: an EPSON G320N, 125 Hz, that stands."""
+    body = "04,41,2209,491674.013699,ea59fe00,329308016,-2706935,4508389,196192,417138,-1000837"
+    content = novatel_text("RAWIMUSXA,2209,491674.014", body, "%") * 4
+    found = ReceiverRead(tmp_path, content)
+    force = [125.0 * found.values("imu", f"delta_velocity_{axis}_mps")[0] for axis in "xyz"]
+    assert force[2] == pytest.approx(-9.856, abs=1e-3) and np.linalg.norm(force) == pytest.approx(9.858, abs=2e-3)
+    assert force[0] == pytest.approx(0.0810, abs=1e-4) and force[1] == pytest.approx(0.1349, abs=1e-4)
+    rate = [125.0 * np.rad2deg(found.values("imu", f"delta_angle_{axis}_rad")[0]) for axis in "xyz"]
+    assert rate == pytest.approx([-0.0509, -0.1222, -0.0239], abs=1e-4)
+
+
+def test_novatel_units_that_are_not_known_and_counts_that_are_none(tmp_path: Path) -> None:
+    content = b"".join(raw_imu("RAWIMUX", 100.0 + at, **COUNTS) for at in range(4))
+    content += raw_imu("RAWIMUX", 104.0, 47, **COUNTS) + raw_imu("RAWIMUX", 105.0, status=1, **COUNTS)
+    content += raw_imu("RAWIMUX", 106.0, status=2, **COUNTS)
+    found = ReceiverRead(tmp_path, content)
+    assert len(found.values("imu", "delta_angle_x_rad")) == 4 and len(found.values("raw.RAWIMUX", "imu_type")) == 7
+    assert any("of a unit of type 47" in getattr(one, "text", "") for one in found.items)
+
+
+@pytest.mark.parametrize("name", ["RAWIMU", "RAWIMUS"])
+def test_novatel_counts_without_a_type_stay_raw(tmp_path: Path, name: str) -> None:
+    found = ReceiverRead(tmp_path, b"".join(raw_imu(name, 100.0 + at, **COUNTS) for at in range(8)))
+    assert not found.batches("imu") and found.values(f"raw.{name}", "del_ang_body_x") == [6.0] * 8
+    assert any(f"{name} (8) stays raw" in getattr(one, "text", "") for one in found.items)

@@ -508,3 +508,28 @@ def test_bad_cells_are_counted_under_the_field(tmp_path: Path) -> None:
     assert [damage.place for damage in damages] == ["gnss.hdop, row 3"]
     kinds = {type(item) for item in registry.read(log, settings)}
     assert RecordBatch in kinds and Remark not in kinds
+
+
+def test_fixes_of_a_receiver_need_no_profile(tmp_path: Path) -> None:
+    names = "latitude_deg,longitude_deg,altitude_ellipsoid_m,velocity_down_mps,north_sigma_m,down_sigma_m,other"
+    log = tmp_path / "gnss.csv"
+    log.write_text(f"# start_utc: 2025-05-19T18:54:39Z; F9T\ntime_s,{names}\n0.5,39,-84,225,-0.1,0.4,0.8,7\n", "utf-8")
+    read = Read(log)
+    assert (
+        read.header.reader == "csv-profile gnss-fixes" and read.header.metadata["start_utc"] == "2025-05-19T18:54:39Z"
+    )
+    fields = ("latitude_deg", "altitude_ellipsoid_m", "velocity_down_mps", "position_north_sigma_m", "vertical_sigma_m")
+    assert [read.values("gnss", name)[0] for name in fields] == [39.0, 225.0, -0.1, 0.4, 0.8]
+    assert read.values("raw.gnss", "other") == [7.0] and read.times("gnss") == [500_000_000]
+
+
+def test_two_columns_may_feed_a_field_where_both_are_optional(tmp_path: Path) -> None:
+    field = '"{}" = {{ field = "gnss.hdop"{} }}\n'
+    both = BASIC + "[columns]\n" + "".join(field.format(name, ", optional = true") for name in "ab")
+    log, settings = files(tmp_path, both, "t,b\n0,1.5\n")
+    assert Read(log, settings).values("gnss", "hdop") == [1.5]
+    log, settings = files(tmp_path, both, "t,b,a\n0,1.5,2.5\n")
+    assert Read(log, settings).values("gnss", "hdop") == [2.5]
+    _log, settings = files(tmp_path, both.replace(", optional = true", "", 1), "")
+    with pytest.raises(SettingsError, match="does not feed already"):
+        profiles.load(settings)

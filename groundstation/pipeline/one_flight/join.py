@@ -105,7 +105,7 @@ def join_files(
         if as_log(path).is_dir():
             raise UsageError(str(path), "a folder", "the logs of one flight by name", "--together takes files")
         try:
-            logs.append(open_log(path, configuration.profile_path, configuration.icds))
+            logs.append(_opened(path, configuration))
         except UnreadableLogError as error:
             unclaimed.append((path, error))
     if not logs and unclaimed:
@@ -116,6 +116,20 @@ def join_files(
     settings = configuration.settings.of(_step().settings)
     left_out = [_left_out(path.name, error) for path, error in unclaimed if path not in used]
     return join_logs(logs, target, configuration.thresholds, settings=settings, left_out=left_out)
+
+
+def _opened(path: Path, configuration: Configuration) -> Log:
+    """Open one of several logs: by the profile, else as a reader knows it."""
+    try:
+        return open_log(path, configuration.profile_path, configuration.icds)
+    except UnreadableLogError:
+        if configuration.profile_path is None:
+            raise
+        try:
+            return open_log(path, None, configuration.icds)
+        except UnreadableLogError:
+            pass
+        raise
 
 
 def join_logs(

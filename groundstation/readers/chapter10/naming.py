@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.records import BoolArray, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.signals import kind_of, topics_of_kind
+from groundstation.readers import imu
 from groundstation.readers.chapter10.bus_words import ANY_ERROR, TOPIC_429, TOPIC_1553, bounded, words_of
 from groundstation.readers.chapter10.contents import KEYS, BusNames, channel_of, keys_429, keys_1553
 from groundstation.readers.chapter10.pieces import SAMPLE_NS, WordSamples, completed, merged
@@ -32,6 +33,7 @@ from groundstation.readers.places import nowhere, placed
 
 # Codes of the remarks that naming makes.
 NAMING_CODES = ("icd", "icd_of_another", "mapped", "several_units", "derived", "bus_errors", "not_used")
+_SIX_AXES = (*imu.RATES, *imu.ACCELERATIONS)
 TRANSMITS = 0x400
 WRONG_WORD = 6  # flags of a 429 word: format or parity error seen by the recorder
 TIME_TAG = "time_tag"  # element that counts the samples of a message sent more often than it is computed
@@ -178,10 +180,20 @@ class Namer:
         self._derived: dict[str, None] = {}
         self._flagged: dict[str, tuple[int, int]] = {}
         self._nowhere: Counter[str] = Counter()
+        self._units: dict[str, str] = {}
         every: list[Element] = [one for word in found.words for one in word.elements if one.signal]
         every += [one for message in found.messages for one in message.elements if one.signal]
         signals = [str(one.signal).rpartition(".") for one in every]
         self._with_velocity = {topic for topic, _dot, name in signals if name == "velocity_north_mps"}
+        told = {(topic, name) for topic, _dot, name in signals}
+        inertial = {topic for topic, _name in told if kind_of(topic) == "ins"}
+        units = {topic: f"imu{topic.removeprefix('ins')}" for topic in inertial}
+        fed = {topic for topic, _name in told}
+        self._inertial = {
+            topic: unit
+            for topic, unit in units.items()
+            if unit not in fed and all((topic, name) in told for name in _SIX_AXES)
+        }
         for word in found.words:
             key = ((word.subchannel or 1) - 1) << 8 | int(REVERSED_BYTE[word.label])
             self._tables.setdefault(f"{TOPIC_429}{word.channel}", _Table()).add(key, word)
@@ -206,6 +218,18 @@ class Namer:
             made = merged(topic, ready, SAMPLE_NS if is_429 else 0) if ready else None
             if made is not None:
                 yield from bounded(self._placed(made))
+                yield from self._unit(made)
+
+    def _unit(self, batch: RecordBatch) -> Iterator[RecordBatch]:
+        """Yield samples of ``imu`` from rows of an INS that have all six axes."""
+        unit = self._inertial.get(batch.topic)
+        if unit is None or not all(name in batch.columns for name in _SIX_AXES):
+            return
+        whole = np.logical_and.reduce([batch.columns[name].mask for name in _SIX_AXES])
+        if whole.any():
+            self._units[unit] = batch.topic
+            columns = imu.samples({name: batch.columns[name] for name in _SIX_AXES})
+            yield from bounded(RecordBatch(unit, batch.record_index, batch.device_time_ns, columns).take(whole))
 
     def _placed(self, batch: RecordBatch) -> RecordBatch:
         """Drop positions of zeros, which a unit sends before it has one."""
@@ -312,6 +336,9 @@ class Namer:
         """Yield remarks on what serves each topic, and what was not used."""
         for topic, sources in sorted(self._sources.items()):
             yield Remark("mapped", f"{topic} from {'; '.join(sources)}", topic)
+        for unit, topic in sorted(self._units.items()):
+            text = f"{unit} from the body rates and accelerations of {topic}; {imu.POINT_SAMPLES}"
+            yield Remark("mapped", text, unit)
         for kind in sorted({kind_of(topic) for topic in self._sources}):
             units = topics_of_kind(kind, tuple(self._sources))
             if len(units) > 1:

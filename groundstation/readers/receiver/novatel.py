@@ -201,10 +201,10 @@ def ins_batch(block: MessagesByName, source: str, tally: StreamTally) -> RecordB
             if "roll_std_dev" not in fields:
                 columns |= _joined(block, messages, other, columns_of)
     columns = credible_attitude(credible_position(columns, "ins", messages.places, tally), messages.places, tally)
-    return occupied("ins", messages.places, _solution_time(messages, fields), columns)
+    return occupied("ins", messages.places, solution_time(messages, fields), columns)
 
 
-def _solution_time(messages: TimedMessages, fields: Mapping[str, NDArray[Any]]) -> Column:
+def solution_time(messages: TimedMessages, fields: Mapping[str, NDArray[Any]]) -> Column:
     """Return the time of validity: the week and second inside the message, or of its header.
 
     Those of the header count where the message has none.

@@ -32,6 +32,9 @@ _HEADING = (
 _INSPVA = f"{_WEEK} latitude:r8 longitude:r8 height:r8 {_VELOCITY} {_ANGLES} ins_solution_status:u4"
 _INSCOV = f"{_WEEK} " + " ".join(f"{kind}_cov_{at}:r8" for kind in ("pos", "att", "vel") for at in range(1, 10))
 _IMU = f"{_WEEK} " + " ".join(f"corr_{kind}_{axis}:r8" for kind in ("rate", "accel") for axis in "xyz")
+_COUNTS_OF_UNIT = "imu_status:u4 " + " ".join(f"del_{kind}_body_{axis}:i4" for kind in ("vel", "ang") for axis in "zyx")
+_RAW_IMU = f"{_WEEK} {_COUNTS_OF_UNIT}"  # those along and about y are negative: -y
+_RAW_IMU_X = f"imu_status_info:u1 imu_type:u1 week:u2 seconds:r8 {_COUNTS_OF_UNIT}"
 
 LAYOUTS: Mapping[str, str] = MappingProxyType(
     {
@@ -57,6 +60,10 @@ LAYOUTS: Mapping[str, str] = MappingProxyType(
         "HEADING": f"{_HEADING}base_id:c4 {_COUNTS}{_SIGNALS}",
         "HEADING2": f"{_HEADING}rover_id:c4 base_id:c4 {_COUNTS}{_SIGNALS}",
         "DUALANTENNAHEADING": f"{_HEADING}base_id:c4 {_COUNTS}{_SIGNALS}",
+        "RAWIMU": _RAW_IMU,
+        "RAWIMUS": _RAW_IMU,
+        "RAWIMUX": _RAW_IMU_X,
+        "RAWIMUSX": _RAW_IMU_X,
     }
 )
 NAMES: Mapping[int, str] = MappingProxyType(

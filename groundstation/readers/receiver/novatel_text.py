@@ -76,9 +76,12 @@ _ENUMERATIONS: Mapping[str, Mapping[str, int]] = {
     "utc_status": _UTC,
 }
 _HEXADECIMAL = frozenset(
-    ("extended_solution_status2", "ext_sol_stat", "gal_and_bds_mask", "gps_and_glo_mask", "extended_sol_stat")
+    (
+        *("extended_solution_status2", "ext_sol_stat", "gal_and_bds_mask", "gps_and_glo_mask", "extended_sol_stat"),
+        *("imu_status", "imu_status_info"),
+    )
 )
-_CODES = {"r4": "f", "r8": "d", "u1": "B", "u2": "H", "u4": "I"}
+_CODES = {"r4": "f", "r8": "d", "u1": "B", "u2": "H", "u4": "I", "i4": "i"}
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from groundstation.base.records import Damage, Int64Array, Remark
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.imu import POINT_SAMPLES
-from groundstation.readers.receiver import nmea, novatel, novatel_messages, scan, ubx
+from groundstation.readers.receiver import nmea, novatel, novatel_inertial, novatel_messages, scan, ubx, ubx_inertial
 from groundstation.readers.receiver.dating import DateFacts, dated
 from groundstation.readers.receiver.host_text import HostText
 from groundstation.readers.receiver.host_times import HostTimes
@@ -27,7 +27,6 @@ from groundstation.readers.receiver.ubx_canonical import (
     POSITION_SOURCES,
     has_attitude,
 )
-from groundstation.readers.receiver.ubx_inertial import SOURCE as INERTIAL
 from groundstation.readers.source import Source
 
 NAME = "receiver"
@@ -53,6 +52,12 @@ class StreamOverview:
         Message or formatter that gives ``ins``; empty where none does.
     heading_address : str
         Address of the sentences that do; empty where a binary message does.
+    inertial : str
+        Message of NovAtel that gives ``imu``; empty where none does.
+    sensors : str
+        Message of u-blox that does; empty where none does.
+    imu_types : Counter of int
+        Its units by the type that the messages state.
     arrivals : Anchors, optional
         Times of arrival by the clock of the computer that recorded, where the stream tells no time.
     is_absolute : bool
@@ -69,6 +74,9 @@ class StreamOverview:
     choice: nmea.Choice = nmea.ALL
     attitude: str = ""
     heading_address: str = ""
+    inertial: str = ""
+    sensors: str = ""
+    imu_types: Counter[int] = field(default_factory=Counter)
     arrivals: Anchors | None = None
     is_absolute: bool = False
     metadata: dict[str, str] = field(default_factory=dict)
@@ -81,6 +89,7 @@ class StreamOverview:
 def overview(source: Source, bare: bool, host: HostText | None = None) -> StreamOverview:
     """Read a stream once; ``host`` is the form of a computer's text in it."""
     found, full_times, attitudes, sound = StreamOverview(), ubx.FullTimes(), Counter[str](), set[str]()
+    samples = Counter[str]()
     places, utc_ns = [], []
     stream = Stream(source, bare, is_hosts=host.accepts if host else None)
     host_clock = HostTimes(host) if host else None
@@ -95,9 +104,13 @@ def overview(source: Source, bare: bool, host: HostText | None = None) -> Stream
         for timed in novatel.messages_of(frames):
             found.counts[timed.name] += len(timed)
             sound |= {timed.name} if timed.is_sound else set()
+            if timed.is_sound and timed.name in novatel_inertial.SOURCES:
+                found.imu_types.update(timed.head()["imu_type"].tolist())
             full_times.take_time(timed.places, timed.time())
             full_times.note_utc_offset(timed)
         attitudes.update(name for name in ATTITUDE_SOURCES if has_attitude(block, name))
+        for name in ubx_inertial.SOURCES:
+            samples[name] += ubx_inertial.samples_in(block, name)
         if _VERSION in block and not found.metadata:
             found.metadata = _versions(block[_VERSION])
         sentences = by_address(frames)
@@ -116,6 +129,7 @@ def overview(source: Source, bare: bool, host: HostText | None = None) -> Stream
         found.blocks.clear()
     else:
         found.damages = tuple(stream.damages())
+    found.sensors = max(samples, key=lambda name: samples[name]) if samples.total() else ""
     _choose(found, attitudes, sound)
     _set_times(found, full_times, np.concatenate([*places, _NOTHING]), np.concatenate([*utc_ns, _NOTHING]), source)
     if host_clock is not None:
@@ -133,6 +147,8 @@ def _choose(found: StreamOverview, attitudes: Counter[str], sound: set[str]) -> 
     """
     leaders = (*POSITION_SOURCES, *novatel_messages.POSITION_SOURCES)
     found.leader = next((name for name in leaders if name in sound), "")
+    found.inertial = max(novatel_inertial.SOURCES, key=lambda name: found.counts[name] if name in sound else 0)
+    found.inertial = found.inertial if found.inertial in sound else ""
     found.choice = _choice_of(found.counts)
     found.attitude = next((name for name in ATTITUDE_SOURCES if attitudes[name]), "")
     if not found.attitude:
@@ -233,20 +249,43 @@ def remarks(found: StreamOverview) -> Iterator[Remark]:
 
 def _inertial_remarks(found: StreamOverview) -> Iterator[Remark]:
     """Yield remarks on what serves ``imu``, and on inertial messages that cannot."""
-    if found.counts[INERTIAL]:
+    if found.sensors:
         text = "measurements along the receiver's own axes, timed by its counter"
-        yield Remark("mapped", f"imu from {INERTIAL}: {text}; {POINT_SAMPLES}", "imu")
+        yield Remark("mapped", f"imu from {found.sensors}: {text}; {POINT_SAMPLES}", "imu")
+    for name in ubx_inertial.SOURCES:
+        if found.counts[name] and name != found.sensors:
+            why = f"{found.sensors} has more samples of the sensors" if found.sensors else _UNTIMED[name]
+            yield Remark("skipped", f"{name} ({found.counts[name]}) stays raw: {why}", f"raw.{name}")
+    if found.inertial:
+        yield from _unit_remarks(found)
     for name, why in _NO_INERTIAL.items():
         if found.counts[name]:
             yield Remark("skipped", f"{name} ({found.counts[name]}) stays raw: {why}", f"raw.{name}")
 
 
+def _unit_remarks(found: StreamOverview) -> Iterator[Remark]:
+    """Yield remarks on the units whose counts serve ``imu``, and on those that cannot."""
+    scales = novatel_inertial.SCALES
+    known = [scales[kind].name for kind in sorted(found.imu_types) if kind in scales]
+    if known:
+        text = "increments along its own axes (forward y, right x, down -z), not turned into the vehicle"
+        yield Remark("mapped", f"imu from {found.inertial} of {', '.join(known)}: {text}", "imu")
+    for kind, count in sorted(found.imu_types.items()):
+        if kind not in scales:
+            yield Remark(
+                "skipped", f"{found.inertial} ({count}) of a unit of type {kind}, whose scale is not known here"
+            )
+
+
 _WITHOUT_GRAVITY = "it is without gravity and the earth's rotation, which are no specific force and no rate"
-_COUNTS_ALONE = "counts whose scale is that of the unit, which the message does not tell"
+_COUNTS_ALONE = "counts whose scale is that of the unit, which the message does not tell (RAWIMUX does)"
 _NO_INERTIAL = {
     **dict.fromkeys(("CORRIMUDATA", "CORRIMUDATAS"), _WITHOUT_GRAVITY),
-    **dict.fromkeys(("RAWIMU", "RAWIMUS", "RAWIMUX", "RAWIMUSX"), _COUNTS_ALONE),
-    "ESF-RAW": "the unit of its counter is not documented; ESF-MEAS has the same sensors",
+    **dict.fromkeys(novatel_inertial.UNSCALED, _COUNTS_ALONE),
+}
+_UNTIMED = {
+    "ESF-MEAS": "it has no inertial data",
+    "ESF-RAW": "it has no inertial data, or no milliseconds that tell their time",
 }
 
 

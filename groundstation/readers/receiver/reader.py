@@ -15,6 +15,7 @@ from groundstation.readers.receiver import (
     nmea,
     nmea_canonical,
     novatel,
+    novatel_inertial,
     scan,
     ubx,
     ubx_canonical,
@@ -99,9 +100,12 @@ def _of_block(
     if gnss is not None:
         tally.add_fixes(gnss)
         yield from bounded(gnss)
-    inertial = ubx_inertial.imu_batch(block, counter, found.anchors)
+    inertial = ubx_inertial.imu_batch(block, found.sensors, counter, found.anchors) if found.sensors else None
     if inertial is not None:
         yield from bounded(inertial)
+    increments = novatel_inertial.imu_batch(block, found.inertial) if found.inertial else None
+    if increments is not None:
+        yield from bounded(_in_their_week(increments, found) or increments)
     ins = _ins(block, epochs, time, found, tally)
     if ins is not None:
         yield from bounded(ins)

@@ -78,6 +78,7 @@ LAYOUTS: Mapping[str, str] = MappingProxyType(
         "MON-VER": "swVersion:c30 hwVersion:c10 | * extension:c30",
         "ESF-MEAS": "timeTag:u4 flags:x2(timeMarkSent:2 timeMarkEdge calibTtagValid -:7 numMeas:5) id:u2 | numMeas "
         "data:x4(dataField:24 dataType:6) | 4",
+        "ESF-RAW": "msss:u4 | * data:x4(dataField:24 dataType:8) sTtag:u4",
         "ESF-STATUS": "iTOW:u4 version:u1 initStatus1:x1(wtInitStatus:2 mntAlgStatus:3 insInitStatus:3) "
         "initStatus2:x1(imuInitStatus:2) -:u5 fusionMode:u1 -:u2 numSens:u1 | numSens "
         "sensStatus1:x1(type:6 used ready) sensStatus2:x1(calibStatus:2 timeStatus:2) freq:u1 "

@@ -246,3 +246,22 @@ def test_motion_overview_and_latency_take_the_long_log_though_the_first_is_short
 def test_a_configuration_may_set_the_limits() -> None:
     settings = Configuration({"together": {"arm_sigma_m": 0.5}}).settings.analyses["together"]
     assert settings.arm_sigma_m == 0.5
+
+
+def test_a_profile_is_used_for_the_log_that_it_describes(tmp_path: Path) -> None:
+    imu, gnss, settings = tmp_path / "imu.csv", tmp_path / "gnss.csv", tmp_path / "my.toml"
+    head = "# start_utc: 2026-05-04T06:00:00Z\n"
+    imu.write_text(head + "".join(f"{0.1 * k},{k % 7}\n" for k in range(300)), encoding="utf-8")
+    rows = "".join(f"{k},{55 + 1e-4 * k},37,150\n" for k in range(30))
+    gnss.write_text(f"{head}time_s,latitude_deg,longitude_deg,altitude_ellipsoid_m\n{rows}", encoding="utf-8")
+    settings.write_text(
+        'name = "p"\n[recognise]\nnames = ["t", "gz"]\n[time]\nkind = "seconds"\ncolumn = "t"\n'
+        "[metadata.find]\nstart_utc = 'start_utc: (\\S+)'\n"
+        '[columns]\ngz = { field = "imu.rate_z_dps", unit = "dps" }\n',
+        encoding="utf-8",
+    )
+    target = tmp_path / "joined.mcap"
+    converted = join_files([imu, gnss], target, Configuration(profile=str(settings)))
+    flight = read_flight(target, converted)
+    assert len(flight["imu"]) == 300 and len(flight["gnss.b"]) == 30
+    assert flight.time_s("gnss.b")[0] == 0.0
