@@ -30,7 +30,10 @@ def simulate(
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the log.", metavar="DIR")],
     seed: Annotated[int | None, typer.Option("--seed", help="Seed in place of the scenario's own.")] = None,
     form: Annotated[
-        Literal["csv", "ch10"], typer.Option("--format", help="csv, or ch10: IRIG 106 Chapter 10 with its ICD.")
+        Literal["csv", "ch10", "ulog", "dataflash", "ros1"],
+        typer.Option(
+            "--format", help="csv; ch10: IRIG 106 Chapter 10 with its ICD; of an inertial unit ulog, dataflash, ros1."
+        ),
     ] = "csv",
     force: Force = False,
     quiet: Quiet = False,

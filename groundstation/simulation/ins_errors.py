@@ -20,14 +20,11 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.compile import compiled
 from groundstation.base.errors import SettingsError
 from groundstation.base.geodesy import EARTH_RATE_RADPS, ECCENTRICITY_SQUARED, FLATTENING, SEMI_MAJOR_M
+from groundstation.base.gravity import GEODETIC_RATIO, GRAVITY_EQUATOR_MPS2, SOMIGLIANA
 from groundstation.base.records import frozen
 
 NORTH, EAST = 0, 1
 LONGEST_STEP_S = 1.0
-# Normal gravity of WGS-84. Source: NIMA TR8350.2, 3rd ed. 2000, tables 3.1 to 3.4, equations 4-1 and 4-3.
-GRAVITY_EQUATOR_MPS2 = 9.7803253359
-SOMIGLIANA = 0.00193185265241
-GEODETIC_RATIO = 0.00344978650684  # omega^2 a^2 b / GM
 
 _A, _E2, _F, _GE, _K, _M = (
     SEMI_MAJOR_M,

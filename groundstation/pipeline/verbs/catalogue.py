@@ -27,6 +27,7 @@ def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict
             *_formats(),
             *_scenarios(),
             *_approaches(),
+            *_inertial_units(),
             *_sessions(),
             *_plans(),
             *_studies(),
@@ -107,6 +108,15 @@ def _approaches() -> list[dict[str, Any]]:
     return [
         {"kind": "scenario", "name": name, "title": load_approach(name).title, "needs": "nothing"}
         for name in approach_names()
+    ]
+
+
+def _inertial_units() -> list[dict[str, Any]]:
+    from groundstation.simulation.imu.scenario import imu_scenario_names, load_imu_scenario
+
+    return [
+        {"kind": "scenario", "name": name, "title": load_imu_scenario(name).title, "needs": "nothing"}
+        for name in imu_scenario_names()
     ]
 
 

@@ -4,9 +4,10 @@ The runs of a study are kept in its folder, so that a stopped study continues.
 """
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
 from groundstation.base.errors import UsageError
@@ -23,14 +24,19 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 
 
+Form = Literal["csv", "ch10", "ulog", "dataflash", "ros1"]
+SUFFIXES: Mapping[Form, str] = MappingProxyType({"csv": "csv", "ulog": "ulg", "dataflash": "BIN", "ros1": "bag"})
+
+
 def simulate_to(
-    scenario: str, folder: Path, *, seed: int | None = None, form: Literal["csv", "ch10"] = "csv", force: bool = False
+    scenario: str, folder: Path, *, seed: int | None = None, form: Form = "csv", force: bool = False
 ) -> list[Path]:
     """Simulate a scenario (a shipped name or a TOML file) into ``<folder>/<scenario>.csv``.
 
     With ``form`` ch10 it is ``<scenario>.ch10``, and the ICD of its buses ``<scenario>.icd.yaml``. A session of several
     aircraft gives one log for each, ``<folder>/<session>-<aircraft>.csv``, with stations.toml and settings.toml beside
-    them; landing aids give the site file that belongs to them, ``<scenario>.site.toml``.
+    them; landing aids give the site file that belongs to them, ``<scenario>.site.toml``. A log of an inertial unit can
+    be ULog (``.ulg``), DataFlash (``.BIN``) or a ROS 1 bag as well, with ``<scenario>.truth.csv`` beside it.
 
     Raises
     ------
@@ -44,6 +50,10 @@ def simulate_to(
     from groundstation.simulation.samples import write_log
     from groundstation.simulation.scenario import load_scenario
 
+    if is_imu(scenario):
+        return _imu_to(scenario, folder, seed, form, force=force)
+    if form not in {"csv", "ch10"}:
+        raise UsageError(scenario, f"--format {form}", "csv or ch10, or a scenario of an inertial unit (imu-uav)")
     if form != "csv" and (is_session(scenario) or is_approach(scenario)):
         raise UsageError(scenario, f"--format {form}", "a scenario of one flight")
     if is_session(scenario):
@@ -92,6 +102,43 @@ def is_approach(scenario: str) -> bool:
         return scenario.lower() in approach_names()
     path = Path(scenario)
     return path.is_file() and isinstance(read_toml(path).get("recorded"), dict)
+
+
+def is_imu(scenario: str) -> bool:
+    """Tell whether a scenario is a log of an inertial unit.
+
+    A shipped name of such, or a TOML file with a ``family``.
+    """
+    from groundstation.simulation.imu.scenario import imu_scenario_names
+
+    if not scenario.endswith(".toml"):
+        return scenario.lower() in imu_scenario_names()
+    path = Path(scenario)
+    return path.is_file() and "family" in read_toml(path)
+
+
+def _imu_to(name: str, folder: Path, seed: int | None, form: Form, *, force: bool) -> list[Path]:
+    from groundstation.simulation.imu.dataflash import write_dataflash
+    from groundstation.simulation.imu.ros_bag import write_ros1
+    from groundstation.simulation.imu.scenario import fly, load_imu_scenario
+    from groundstation.simulation.imu.tables import write_csv, write_truth
+    from groundstation.simulation.imu.ulog import write_ulog
+
+    writers = {"csv": write_csv, "ulog": write_ulog, "dataflash": write_dataflash, "ros1": write_ros1}
+    if form not in writers:
+        raise UsageError(name, f"--format {form}", f"one of {', '.join(writers)}")
+    scenario = load_imu_scenario(name)
+    paths = [folder / f"{scenario.name}.{SUFFIXES[form]}"]
+    if form != "csv" and scenario.truth_rate_hz > 0.0:
+        paths.append(folder / f"{scenario.name}.truth.csv")
+    there = [path for path in paths if path.exists()]
+    if there and not force:
+        raise UsageError(str(there[0]), "a file that exists", "a new folder", "-f overwrites it")
+    folder.mkdir(parents=True, exist_ok=True)
+    flight = fly(scenario, seed)
+    for path, write in zip(paths, (writers[form], write_truth), strict=False):
+        write(path, flight, scenario)
+    return paths
 
 
 def _approach_to(name: str, folder: Path, seed: int | None, *, force: bool) -> Path:
