@@ -1,0 +1,1 @@
+"""Simulated logs of an inertial unit with GNSS: exact increments, errors, truth."""
