@@ -136,8 +136,9 @@ def rotations(vector_rad: FloatArray) -> FloatArray:
 
 def lags_of(settings: MountingSettings) -> FloatArray:
     """Return the lags that are tried."""
-    count = int(round(settings.lag_max_s / settings.lag_step_s))
-    return settings.lag_step_s * np.arange(-count, count + 1)
+    count = round(settings.lag_max_s / settings.lag_step_s)
+    lags: FloatArray = settings.lag_step_s * np.arange(-count, count + 1, dtype=np.float64)
+    return lags
 
 
 def ranked(spans: Spans, sums: Sums, settings: MountingSettings) -> tuple[Explanation, ...]:
@@ -151,9 +152,7 @@ def ranked(spans: Spans, sums: Sums, settings: MountingSettings) -> tuple[Explan
             for is_right, values in ((True, right), (False, left)):
                 best = np.argmax(values, axis=1)
                 for turn, lag, value in zip(turns, best, values.max(axis=1), strict=True):
-                    found.append(
-                        Explanation(sign * turn, is_right, scale, float(lags_of(settings)[lag]), float(value))
-                    )
+                    found.append(Explanation(sign * turn, is_right, scale, float(lags_of(settings)[lag]), float(value)))
     return tuple(sorted(found, key=lambda one: -one.log_likelihood))
 
 
@@ -211,15 +210,22 @@ class Relation:
     over_others : float
         Log-likelihood over the best one with spans of the unit paired with other spans of GNSS.
     unexplained : float
-        Misfit over the variance of the changes of velocity of GNSS, median of the spans.
+        Squared misfit over the variance of the changes of velocity of GNSS, median of the spans.
+    misfit_mps : float
+        RMS of a change of velocity, median of the spans.
+    lag_is_inside : bool
+        The best lag is none of the ends of those that were tried.
     """
 
     over_others: float
     unexplained: float
+    misfit_mps: float
+    lag_is_inside: bool
 
     def holds(self, settings: MountingSettings) -> bool:
         """Tell whether the unit moves as GNSS does: one on another vehicle does no better with its own times."""
-        return self.over_others >= settings.margin_min and self.unexplained <= settings.unexplained_max
+        is_near = self.unexplained <= settings.unexplained_max and self.misfit_mps <= settings.misfit_max_mps
+        return self.over_others >= settings.margin_min and is_near and self.lag_is_inside
 
 
 def relation_of(spans: Spans, sums: Sums, settings: MountingSettings, one: Explanation) -> Relation:
@@ -234,7 +240,12 @@ def relation_of(spans: Spans, sums: Sums, settings: MountingSettings, one: Expla
     lag = int(np.argmin(np.abs(lags_of(settings) - one.lag_s)))
     misfit = misfits(spans.wanted_mps, changes)[hand][0, :, lag]
     spread = ((spans.wanted_mps - spans.wanted_mps.mean(axis=1, keepdims=True)) ** 2).sum(axis=(1, 2))
-    return Relation(one.log_likelihood - best, float(np.median(misfit / spread)))
+    return Relation(
+        one.log_likelihood - best,
+        float(np.median(misfit / spread)),
+        float(np.sqrt(np.median(misfit) / (3 * spans.wanted_mps.shape[1] - 3))),
+        settings.lag_max_s == 0.0 or abs(one.lag_s) < settings.lag_max_s - 0.5 * settings.lag_step_s,
+    )
 
 
 def attitudes(spans: Spans, carried: Carried, lag_s: float) -> FloatArray:

@@ -34,7 +34,8 @@ def signed_permutations() -> FloatArray:
 def axis_turns() -> FloatArray:
     """Return the 24 right-handed turns, shape (24, 3, 3), the identity first."""
     every = signed_permutations()
-    return every[np.linalg.det(every) > 0.0]
+    turns: FloatArray = every[np.linalg.det(every) > 0.0]
+    return turns
 
 
 def from_angles(roll_pitch_yaw_deg: tuple[float, float, float] | FloatArray) -> FloatArray:
@@ -60,7 +61,8 @@ def angles_of(rotation: FloatArray) -> FloatArray:
     roll = np.arctan2(rotation[..., 2, 1], rotation[..., 2, 2])
     pitch = -np.arcsin(np.clip(rotation[..., 2, 0], -1.0, 1.0))
     yaw = np.arctan2(rotation[..., 1, 0], rotation[..., 0, 0])
-    return np.rad2deg(np.stack([roll, pitch, yaw], axis=-1))
+    angles: FloatArray = np.rad2deg(np.stack([roll, pitch, yaw], axis=-1))
+    return angles
 
 
 def angle_between_deg(one: FloatArray, other: FloatArray) -> FloatArray:
@@ -72,7 +74,8 @@ def angle_between_deg(one: FloatArray, other: FloatArray) -> FloatArray:
     90.0
     """
     trace = np.einsum("...ij,...ij->...", one, other)
-    return np.rad2deg(np.arccos(np.clip(0.5 * (trace - 1.0), -1.0, 1.0)))
+    angles: FloatArray = np.rad2deg(np.arccos(np.clip(0.5 * (trace - 1.0), -1.0, 1.0)))
+    return angles
 
 
 def axes_told(body_from_case: FloatArray) -> str:

@@ -22,6 +22,7 @@ from groundstation.systems.trajectory.axis_turns import (
     axis_turns,
     from_angles,
 )
+from groundstation.systems.trajectory.fix_checks import wrong_velocity
 from groundstation.systems.trajectory.inputs import GnssFixes, ImuIncrements
 from groundstation.systems.trajectory.mounting_looks import (
     Correlations,
@@ -48,6 +49,7 @@ from groundstation.tables.vehicle import VehicleKind
 
 Source = Literal["stated", "logged", "found", "case", "refused"]
 LEAST_CORRELATION = 0.5  # of the looks at what rolls
+SHIPPED = MountingSettings()
 UNRELATED = "its motion is not that of GNSS: a unit of another vehicle, or of another time"
 MIRRORED = "its axes are left-handed: one is turned round, or two are swapped"
 REVERSED = "its accelerometers have the signs of gravity, not of specific force, or its axes and rates are left-handed"
@@ -81,8 +83,8 @@ class MountingEvidence:
         Spans of dead reckoning with enough motion.
     margin, margin_of_others : float
         Log-likelihood of a sound unit over the best unsound explanation, and over other times of GNSS.
-    unexplained : float
-        Share of the changes of velocity of GNSS that a sound unit leaves unexplained.
+    unexplained, misfit_mps : float
+        Share of the squared changes of velocity of GNSS that a sound unit leaves unexplained, and their RMS.
     lag_s : float
         GNSS later than the unit, to the step that was tried.
     gravity_concentration, travel_concentration : float
@@ -100,6 +102,7 @@ class MountingEvidence:
     margin: float = np.nan
     margin_of_others: float = np.nan
     unexplained: float = np.nan
+    misfit_mps: float = np.nan
     lag_s: float = np.nan
     gravity_concentration: float = np.nan
     travel_concentration: float = np.nan
@@ -159,7 +162,7 @@ def find_mounting(
     vehicle: VehicleKind | None,
     stated: tuple[float, float, float] | None = None,
     logged: LoggedMounting | None = None,
-    settings: MountingSettings = MountingSettings(),
+    settings: MountingSettings = SHIPPED,
 ) -> Mounting:
     """Return the mounting of a unit.
 
@@ -180,7 +183,7 @@ def find_mounting(
     if len(imu) < 3:
         return _refused("too few samples of the unit", MountingEvidence())
     steps = steps_of(imu, gnss, settings)
-    reason = stuck_axis(imu) or wrong_force(steps, settings)
+    reason = wrong_velocity(gnss) or stuck_axis(imu) or wrong_force(steps, settings)
     if reason:
         return _refused(reason, MountingEvidence())
     motion = _motion(imu, steps, settings)
@@ -205,7 +208,9 @@ def _motion(imu: ImuIncrements, steps: Steps, settings: MountingSettings) -> _Mo
     rival = next(one for one in every if not one.is_sound)
     relation = relation_of(spans, sums, settings, sound)
     margin = sound.log_likelihood - rival.log_likelihood
-    evidence = MountingEvidence(len(spans), margin, relation.over_others, relation.unexplained, sound.lag_s)
+    evidence = MountingEvidence(
+        len(spans), margin, relation.over_others, relation.unexplained, relation.misfit_mps, sound.lag_s
+    )
     if margin <= -settings.margin_min and relation_of(spans, sums, settings, rival).holds(settings):
         return _refused(_explained(every, settings), evidence)
     if not relation.holds(settings):
@@ -214,20 +219,28 @@ def _motion(imu: ImuIncrements, steps: Steps, settings: MountingSettings) -> _Mo
 
 
 def _explained(every: tuple[Explanation, ...], settings: MountingSettings) -> str:
-    """Return the simplest explanation among those about as likely as the best one."""
+    """Return what explains the increments: the simple ones among those about as likely as the best."""
     near = [one for one in every if one.log_likelihood >= every[0].log_likelihood - settings.margin_min]
-    for one in near:
-        if one.turns_alike and one.is_right_handed and one.scale != 1.0:
-            return IN_DEGREES if one.scale < 1.0 else IN_RADIANS
-    if any(one.turns_alike and not one.is_right_handed for one in near):
+    if every[0].scale == 1.0:
+        near = [one for one in near if one.scale == 1.0]
+    told = [_told(one) for one in near if one.turns_alike or one.is_right_handed] or [_told(every[0])]
+    return ", or ".join(dict.fromkeys(told))
+
+
+def _told(one: Explanation) -> str:
+    """Return an unsound explanation in words."""
+    if one.scale != 1.0:
+        return IN_DEGREES if one.scale < 1.0 else IN_RADIANS
+    if one.is_right_handed:
+        return OTHER_AXES
+    if one.turns_alike:
         return MIRRORED
-    best = every[0]
-    if not best.is_right_handed:
-        return REVERSED if (best.gyro_turn == np.eye(3)).all() else f"{MIRRORED}; and {OTHER_AXES}"
-    return OTHER_AXES
+    return REVERSED if (one.gyro_turn == np.eye(3)).all() else f"{MIRRORED}; and {OTHER_AXES}"
 
 
-def _found(motion: _Motion | MountingEvidence, steps: Steps, vehicle: VehicleKind | None, settings: MountingSettings) -> Mounting:
+def _found(
+    motion: _Motion | MountingEvidence, steps: Steps, vehicle: VehicleKind | None, settings: MountingSettings
+) -> Mounting:
     """Return the turn that gravity and travel show, else the attitude of the case with the reason."""
     if isinstance(motion, MountingEvidence):
         gravity = gravity_of(steps)
@@ -241,7 +254,7 @@ def _found(motion: _Motion | MountingEvidence, steps: Steps, vehicle: VehicleKin
     evidence = _with(evidence, agree)
     if vehicle == "walks":
         return _of_case("what is carried has no forward", evidence)
-    if looks.travel.count < settings.travel_steps_min:
+    if evidence.measured_deg is None or looks.travel.count < settings.travel_steps_min:
         return _of_case("too little travel shows which way is forward", evidence)
     if min(looks.travel.concentration, looks.gravity.concentration) < settings.concentration_min:
         return _of_case("it does not travel along one axis of the case", evidence)
@@ -249,7 +262,7 @@ def _found(motion: _Motion | MountingEvidence, steps: Steps, vehicle: VehicleKin
         return _of_case("a craft that may fly in any direction does not show which way is forward", evidence)
     if not flies and _contradicts(agree):
         return _refused("speeding up, turning and travel do not show the same forward and right", evidence)
-    return _turned(turn, evidence, settings)
+    return _turned(turn, evidence.measured_deg, evidence, settings)
 
 
 def _down_told(gravity: Direction) -> str:
@@ -260,13 +273,12 @@ def _down_told(gravity: Direction) -> str:
     return f"; its {'xyz'[most]} axis points {'down' if gravity.vector[most] > 0.0 else 'up'}"
 
 
-def _turned(turn: FloatArray, evidence: MountingEvidence, settings: MountingSettings) -> Mounting:
-    assert evidence.measured_deg is not None  # noqa: S101 - made with the turn
-    roll, pitch, yaw = evidence.measured_deg
+def _turned(turn: FloatArray, measured: FloatArray, evidence: MountingEvidence, settings: MountingSettings) -> Mounting:
+    """Return the axis turn, or the measured one where the case stands at an angle."""
     seen = f"gravity and {counted(evidence.travel_steps, 'second')} of travel show"
     if evidence.off_square_deg > settings.square_within_deg:
-        words = f"{seen} the case at roll {roll:.0f}, pitch {pitch:.0f}, yaw {yaw:.0f} deg"
-        return Mounting("found", from_angles(evidence.measured_deg), words, evidence)
+        words = "{} the case at roll {:.0f}, pitch {:.0f}, yaw {:.0f} deg".format(seen, *measured)
+        return Mounting("found", from_angles(measured), words, evidence)
     words = f"{seen} {axes_told(turn)}, {evidence.off_square_deg:.1f} deg off"
     return Mounting("found", turn, words, evidence)
 

@@ -27,6 +27,7 @@ class MountingSettings:
     spans_min: int = number(4, 2, 1000)  # fewer tell nothing
     margin_min: float = number(10.0, 1.0, 1000.0)  # log units between two explanations, as of two headings
     unexplained_max: float = number(0.35, 0.01, 1.0)  # of the variance of GNSS's changes of velocity
+    misfit_max_mps: float = number(1.0, 0.01, 100.0)  # RMS of a change of velocity in a step
     unrelated_motion_mps: float = number(0.25, 0.05, 20.0)  # change of velocity in a step that a unit cannot miss
     gravity_range_mps2: tuple[float, float] = (8.0, 12.5)  # median; aircraft in turns and cars on bad roads are inside
 

@@ -70,7 +70,9 @@ class Sums:
     """Running sums of increments, to be read at any time: no vibration is aliased."""
 
     def __init__(self, imu: ImuIncrements, bias_radps: FloatArray | None = None) -> None:
-        angle = imu.delta_angle_rad if bias_radps is None else imu.delta_angle_rad - bias_radps * imu.interval_s[:, None]
+        angle = (
+            imu.delta_angle_rad if bias_radps is None else imu.delta_angle_rad - bias_radps * imu.interval_s[:, None]
+        )
         zero = np.zeros((1, 3))
         self.time_s = np.concatenate([imu.time_s[:1] - imu.interval_s[:1], imu.time_s])
         self.angle_rad = np.concatenate([zero, np.cumsum(angle, axis=0)])
@@ -82,7 +84,9 @@ class Sums:
     def between(self, start_s: FloatArray, end_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return angle and velocity gathered between times, shapes (..., 3); NaN across a gap or outside."""
         whole = self.is_whole(start_s, end_s)[..., None]
-        angle, velocity = (self.at(end_s, sums) - self.at(start_s, sums) for sums in (self.angle_rad, self.velocity_mps))
+        angle, velocity = (
+            self.at(end_s, sums) - self.at(start_s, sums) for sums in (self.angle_rad, self.velocity_mps)
+        )
         return np.where(whole, angle, np.nan), np.where(whole, velocity, np.nan)
 
     def at(self, time_s: FloatArray, sums: FloatArray) -> FloatArray:
