@@ -1,4 +1,6 @@
-"""Explanations of a unit's increments by turned, mirrored and scaled axes, ranked by how well GNSS agrees.
+"""Explanations of a unit's increments by turned, mirrored and scaled axes.
+
+They are ranked by how well GNSS agrees.
 
 For each turn G of the gyros against the accelerometers, and for each lag, the specific force is carried through the
 span with rates G w; u are its changes of velocity in the axes of the start. The rotation that brings u nearest to
@@ -61,16 +63,18 @@ class Explanation:
 
 @dataclass(frozen=True)
 class Carried:
-    """Attitude and products of it with the force, summed over each span on an even grid of times.
+    """Attitude, and sums of its products with the force, over each span.
 
-    Parameters
-    ----------
-    start_s : ndarray, shape (s,)
-    step_s : float
-    attitude : ndarray, shape (s, k, 3, 3)
-        Start axes from the axes of the case, at the times start_s + k step_s.
-    products_mps : ndarray, shape (s, k, 3, 3, 3)
-        Sum of attitude[i, j] times increment of velocity[l].
+    They are on an even grid of times.
+
+        Parameters
+        ----------
+        start_s : ndarray, shape (s,)
+        step_s : float
+        attitude : ndarray, shape (s, k, 3, 3)
+            Start axes from the axes of the case, at the times start_s + k step_s.
+        products_mps : ndarray, shape (s, k, 3, 3, 3)
+            Sum of attitude[i, j] times increment of velocity[l].
     """
 
     start_s: FloatArray
@@ -168,7 +172,7 @@ def moved(spans: Spans, carried: Carried, turns: FloatArray, settings: MountingS
 def likelihoods(
     spans: Spans, changes_mps: FloatArray, settings: MountingSettings, order: Int64Array | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Return log-likelihoods for right-handed and left-handed axes, each of shape (turns, lags).
+    """Return log-likelihoods for right-handed and left-handed axes, shape (turns, lags).
 
     The misfit of a span has an unknown scale of its own, above that of a good receiver: one bad span decides nothing.
     ``order`` pairs spans of the unit with other spans of GNSS.
@@ -182,7 +186,7 @@ def likelihoods(
 
 
 def misfits(wanted_mps: FloatArray, changes_mps: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the squared misfits, m2/s2, of the best right-handed and left-handed rotation of each span.
+    """Return the squared misfits of the best right- and left-handed rotation of each span.
 
     Parameters
     ----------
@@ -191,7 +195,7 @@ def misfits(wanted_mps: FloatArray, changes_mps: FloatArray) -> tuple[FloatArray
 
     Returns
     -------
-    two ndarrays, shape (turns, s, lags)
+    two ndarrays, shape (turns, s, lags), m2/s2
     """
     inner = np.einsum("smi,gsnmj->gsnij", wanted_mps, changes_mps, optimize=True)
     size = (wanted_mps**2).sum(axis=(1, 2))[None, :, None] + (changes_mps**2).sum(axis=(3, 4))
@@ -223,13 +227,16 @@ class Relation:
     lag_is_inside: bool
 
     def holds(self, settings: MountingSettings) -> bool:
-        """Tell whether the unit moves as GNSS does: one on another vehicle does no better with its own times."""
+        """Tell whether the unit moves as GNSS does.
+
+        One on another vehicle does no better with its own times.
+        """
         is_near = self.unexplained <= settings.unexplained_max and self.misfit_mps <= settings.misfit_max_mps
-        return self.over_others >= settings.margin_min and is_near and self.lag_is_inside
+        return self.over_others >= settings.over_others_min and is_near and self.lag_is_inside
 
 
 def relation_of(spans: Spans, sums: Sums, settings: MountingSettings, one: Explanation) -> Relation:
-    """Return how an explanation does against other times of GNSS, and how much it leaves unexplained."""
+    """Return how an explanation does against other times, and what it leaves unexplained."""
     sign = float(np.sign(np.linalg.det(one.gyro_turn)))
     carried = carry(spans, sums, settings, sign * one.scale)
     changes = moved(spans, carried, sign * one.gyro_turn[None], settings)
@@ -249,7 +256,7 @@ def relation_of(spans: Spans, sums: Sums, settings: MountingSettings, one: Expla
 
 
 def attitudes(spans: Spans, carried: Carried, lag_s: float) -> FloatArray:
-    """Return north-east-down from the axes of the case in the middle of each step, shape (s, m, 3, 3)."""
+    """Return n from the axes of the case in the middle of each step, shape (s, m, 3, 3)."""
     nodes = carried.products_at(spans.node_s - lag_s)
     changes = np.einsum("smijj->smi", np.diff(nodes, axis=1))
     left, _, right = np.linalg.svd(np.einsum("smi,smj->sij", spans.wanted_mps, changes))

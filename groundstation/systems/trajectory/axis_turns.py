@@ -1,4 +1,4 @@
-"""Turns of axes: the 24 ways a case can stand square to a body, and the 24 mirrored ones that are refused."""
+"""Turns of axes: 24 ways in which a case can stand square to a body, and 24 mirrored."""
 
 from itertools import permutations, product
 
@@ -13,7 +13,7 @@ _OPPOSITE = ("back", "left", "up")
 
 
 def signed_permutations() -> FloatArray:
-    """Return the 48 matrices that swap axes and turn them round, shape (48, 3, 3), the identity first.
+    """Return the 48 matrices that swap axes and turn them round, the identity first.
 
     Those with determinant 1 are turns, the others mirror.
 
@@ -39,7 +39,7 @@ def axis_turns() -> FloatArray:
 
 
 def from_angles(roll_pitch_yaw_deg: tuple[float, float, float] | FloatArray) -> FloatArray:
-    """Return body_from_case of a case that stands at roll, pitch and yaw to the body, shape (3, 3).
+    """Return body_from_case of a case that stands at roll, pitch and yaw to the body.
 
     Examples
     --------
@@ -51,7 +51,9 @@ def from_angles(roll_pitch_yaw_deg: tuple[float, float, float] | FloatArray) -> 
 
 
 def angles_of(rotation: FloatArray) -> FloatArray:
-    """Return roll, pitch and yaw of rotations, shape (..., 3, 3), in degrees; inverse of :func:`from_angles`.
+    """Return roll, pitch and yaw of rotations, shape (..., 3, 3), in degrees.
+
+    It is the inverse of :func:`from_angles`.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Check of GNSS velocities against the positions of the same fixes: swapped or reversed components."""
+"""Check of GNSS velocities against positions: swapped or reversed components."""
 
 from itertools import permutations, product
 
@@ -17,7 +17,7 @@ OPPOSITE = -0.5  # correlation
 
 
 def wrong_velocity(gnss: GnssFixes) -> str:
-    """Return how velocities differ from the way of the positions; empty where they agree or nothing shows it.
+    """Return how velocities differ from the way of the positions; empty where they agree.
 
     Each of the eight ways to swap and to reverse north and east is held against the displacements over a second.
     """
@@ -50,7 +50,10 @@ def _horizontal(moved: FloatArray, mean: FloatArray) -> str:
 
 
 def _steps(gnss: GnssFixes) -> tuple[FloatArray, FloatArray]:
-    """Return mean velocities by positions and by velocities over steps of a second, north, east, up, shape (n, 3)."""
+    """Return mean velocities by positions and by velocities over steps of a second.
+
+    North, east, up, shape (n, 3).
+    """
     known = (
         np.isfinite(gnss.velocity_mps).all(axis=1) & np.isfinite(gnss.latitude_deg) & np.isfinite(gnss.longitude_deg)
     )

@@ -1,4 +1,4 @@
-"""Mounting of an inertial unit: how the axes of its case stand to the body's forward, right and down.
+"""Mounting of an inertial unit: how its case stands to the body's forward, right, down.
 
 Stated in the aircraft file, or known from the log of an autopilot that turns its samples itself, else the turn of the
 axes that gravity and the direction of travel show; else the attitude is that of the case. Before any of them is
@@ -130,7 +130,7 @@ class Mounting:
         One line for people.
     evidence : MountingEvidence
     refused, doubt : str
-        Why the unit is refused; what speaks against a mounting that was told. Empty without.
+        Why the unit is refused; what speaks against it, or against a mounting that was told. Empty without.
     """
 
     source: Source
@@ -153,6 +153,7 @@ class _Motion:
     sums: Sums
     sound: Explanation
     evidence: MountingEvidence
+    doubt: str
 
 
 def find_mounting(
@@ -189,16 +190,22 @@ def find_mounting(
     motion = _motion(imu, steps, settings)
     if isinstance(motion, Mounting):
         return motion
-    found = _found(motion, steps, vehicle, settings)
+    mounting = _found(motion, steps, vehicle, settings)
     if stated is not None:
-        return _stated(found, stated, settings)
-    if logged is not None:
-        return _logged(found, logged, settings)
-    return found
+        mounting = _stated(mounting, stated, settings)
+    elif logged is not None:
+        mounting = _logged(mounting, logged, settings)
+    doubt = motion.doubt if isinstance(motion, _Motion) else ""
+    if not doubt or mounting.refused:
+        return mounting
+    return replace(mounting, doubt="; ".join(one for one in (mounting.doubt, f"maybe {doubt}") if one))
 
 
 def _motion(imu: ImuIncrements, steps: Steps, settings: MountingSettings) -> _Motion | Mounting | MountingEvidence:
-    """Hold the unit against GNSS: a refusal, the evidence where there is too little motion, else the motion."""
+    """Hold the unit against GNSS.
+
+    A refusal, the evidence where there is too little motion, else the motion.
+    """
     sums = Sums(imu, resting_rate_radps(steps))
     spans = spans_of(steps, sums, settings)
     if len(spans) < settings.spans_min:
@@ -215,12 +222,15 @@ def _motion(imu: ImuIncrements, steps: Steps, settings: MountingSettings) -> _Mo
         return _refused(_explained(every, settings), evidence)
     if not relation.holds(settings):
         return _refused(UNRELATED, evidence) if has_real_motion(spans, settings) else evidence
-    return _Motion(steps, spans, sums, sound, evidence)
+    doubt = _explained(every, settings) if margin <= -settings.margin_doubt else ""
+    return _Motion(steps, spans, sums, sound, evidence, doubt)
 
 
 def _explained(every: tuple[Explanation, ...], settings: MountingSettings) -> str:
-    """Return what explains the increments: the simple ones among those about as likely as the best."""
-    near = [one for one in every if one.log_likelihood >= every[0].log_likelihood - settings.margin_min]
+    """Return what explains the increments: simple ones about as likely as the best."""
+    near = [
+        one for one in every if not one.is_sound and one.log_likelihood >= every[0].log_likelihood - settings.margin_min
+    ]
     if every[0].scale == 1.0:
         near = [one for one in near if one.scale == 1.0]
     told = [_told(one) for one in near if one.turns_alike or one.is_right_handed] or [_told(every[0])]
@@ -241,7 +251,7 @@ def _told(one: Explanation) -> str:
 def _found(
     motion: _Motion | MountingEvidence, steps: Steps, vehicle: VehicleKind | None, settings: MountingSettings
 ) -> Mounting:
-    """Return the turn that gravity and travel show, else the attitude of the case with the reason."""
+    """Return the turn that gravity and travel show, else why it is that of the case."""
     if isinstance(motion, MountingEvidence):
         gravity = gravity_of(steps)
         told = replace(motion, gravity_concentration=gravity.concentration)
@@ -250,7 +260,7 @@ def _found(
     speed = settings.flight_speed_min_mps if flies else settings.speed_min_mps
     looks = looks_of(steps, motion.spans, motion.sums, motion.sound.lag_s, speed, settings)
     turn, evidence = _nearest(looks, motion.evidence)
-    agree = correlations(steps, motion.sums, turn, motion.sound.lag_s, speed)
+    agree = correlations(steps, motion.sums, turn, motion.sound.lag_s, speed, rolls=not flies)
     evidence = _with(evidence, agree)
     if vehicle == "walks":
         return _of_case("what is carried has no forward", evidence)

@@ -1,4 +1,4 @@
-"""Mounting that the log of an autopilot tells: its samples are in body axes before they are logged.
+"""Mounting that the log of an autopilot tells: its samples are in body axes already.
 
 PX4 turns the values of its drivers by SENS_BOARD_ROT and then by SENS_BOARD_X_OFF, Y_OFF and Z_OFF; vehicle_imu,
 sensor_combined, vehicle_angular_velocity and vehicle_acceleration have the turned values, and so have HIGHRES_IMU,
@@ -27,7 +27,7 @@ TRIM = ("AHRS_TRIM_X", "AHRS_TRIM_Y", "AHRS_TRIM_Z")
 
 
 def logged_mounting(flight: Flight) -> LoggedMounting | None:
-    """Return the mounting of the samples of ``imu`` that the log tells; None where it is no autopilot's."""
+    """Return the mounting of the samples of ``imu``; None where no autopilot logged them."""
     parameters = parameters_of(flight)
     if (found := parameters.value("SENS_BOARD_ROT")) is not None:
         return LoggedMounting(np.eye(3), f"{TURNED} (SENS_BOARD_ROT {found:.0f}{_level(parameters)})")

@@ -85,12 +85,13 @@ def measured_turn(looks: Looks) -> FloatArray:
 
 @dataclass(frozen=True)
 class Correlations:
-    """Agreement of the turned unit with GNSS, step by step, while it travels; NaN where nothing shows it.
+    """Agreement of the turned unit with GNSS while it travels; NaN where nothing shows it.
 
     Parameters
     ----------
     along, across : float
-        Correlation of forward force with the gain of speed, and of force to the right with speed times rate of track.
+        Correlation of forward force with the gain of speed, and of force to the right with speed times rate of track;
+        of what rolls alone: a bank and the pull of an engine take them away.
     turning : float
         Correlation of the rate about down with the rate of track.
     turning_ratio : float
@@ -105,7 +106,9 @@ class Correlations:
     count: int
 
 
-def correlations(steps: Steps, sums: Sums, body_from_case: FloatArray, lag_s: float, speed_min: float) -> Correlations:
+def correlations(
+    steps: Steps, sums: Sums, body_from_case: FloatArray, lag_s: float, speed_min: float, *, rolls: bool
+) -> Correlations:
     """Return how the unit in body axes agrees with GNSS."""
     angle, gathered = sums.between(steps.start_s - lag_s, steps.end_s - lag_s)
     force = gathered @ body_from_case.T / steps.length_s[:, None]
@@ -121,8 +124,8 @@ def correlations(steps: Steps, sums: Sums, body_from_case: FloatArray, lag_s: fl
     track, turned = track_rate[good], rate[good, 2]
     size = float(track @ track)
     return Correlations(
-        _correlation(force[good, 0], gain[good]),
-        _correlation(force[good, 1], (speed * track_rate)[good]),
+        _correlation(force[good, 0], gain[good]) if rolls else np.nan,
+        _correlation(force[good, 1], (speed * track_rate)[good]) if rolls else np.nan,
         _correlation(turned, track),
         float(turned @ track) / size if size > 0.0 else np.nan,
         int(good.sum()),
@@ -136,7 +139,7 @@ def _correlation(one: FloatArray, other: FloatArray) -> float:
 
 
 def flies_nose_first(steps: Steps, found: Correlations, settings: MountingSettings) -> bool:
-    """Tell whether it moved on without a stop for long, with turns in which the nose went along with the track.
+    """Tell whether it moved on for long, the nose turning along with the track.
 
     A multicopter may fly in any direction of its body; one that does not is told from an aeroplane by its stops.
     """

@@ -1,4 +1,4 @@
-"""Constant offsets between attitudes: of the case to the direction of travel, of an on-board filter to ours.
+"""Constant offsets: of the case to the travel, of an on-board filter to our attitude.
 
 A constant offset is mounting: how a case stands to the body, or how a filter's axes stand to the case. It is never
 counted as error of a filter.
@@ -24,7 +24,7 @@ LARGE = 3.0  # sigmas of a robust spread, beyond which a sample counts less
 
 @dataclass(frozen=True)
 class TravelOffset:
-    """Yaw and pitch of the case to the direction of travel of what rolls, degrees; NaN where not seen.
+    """Yaw and pitch of the case to the travel of what rolls; NaN where not seen.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def _median_and_sigma(blocks: FloatArray, *, is_angle: bool = False) -> tuple[fl
 
 @dataclass(frozen=True)
 class SplitAttitude:
-    """Attitude of an on-board filter against ours: a constant offset, which is mounting, and the rest.
+    """Attitude of a filter against ours: a constant offset, which is mounting, and the rest.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ class SplitAttitude:
 
 
 def split_attitude(time_s: FloatArray, onboard_deg: FloatArray, ours_deg: FloatArray) -> SplitAttitude:
-    """Split the attitude of an on-board filter minus ours into a constant offset of axes and the rest.
+    """Split the attitude of a filter against ours into a constant offset and the rest.
 
     Parameters
     ----------
@@ -162,7 +162,10 @@ def split_attitude(time_s: FloatArray, onboard_deg: FloatArray, ours_deg: FloatA
 
 
 def _mean_rotation(time_s: FloatArray, between: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the robust mean of rotations, and the sigmas of its vector in degrees; the identity without enough."""
+    """Return the robust mean of rotations, and sigmas of its vector in degrees.
+
+    The identity where there is too little of them.
+    """
     mean = _nearest_rotation(between.mean(axis=0))
     for _ in range(ROUNDS):
         vectors = _vectors(mean.T @ between)

@@ -25,7 +25,9 @@ class MountingSettings:
 
     # What the unit shows
     spans_min: int = number(4, 2, 1000)  # fewer tell nothing
-    margin_min: float = number(10.0, 1.0, 1000.0)  # log units between two explanations, as of two headings
+    margin_min: float = number(5.0, 0.5, 1000.0)  # log units by which an unsound explanation is likelier: refused
+    margin_doubt: float = number(1.5, 0.1, 1000.0)  # likewise: told as a doubt
+    over_others_min: float = number(10.0, 1.0, 1000.0)  # log units over other times of GNSS
     unexplained_max: float = number(0.35, 0.01, 1.0)  # of the variance of GNSS's changes of velocity
     misfit_max_mps: float = number(1.0, 0.01, 100.0)  # RMS of a change of velocity in a step
     unrelated_motion_mps: float = number(0.25, 0.05, 20.0)  # change of velocity in a step that a unit cannot miss

@@ -1,4 +1,4 @@
-"""Short spans of dead reckoning: increments of a unit beside the changes of velocity of GNSS.
+"""Short spans of dead reckoning: increments of a unit beside changes of GNSS velocity.
 
 Over a span the unit's own gyros carry its specific force into the axes that the case had at the start; GNSS gives the
 same changes of velocity in north, east and down. One rotation makes them agree if the unit is right-handed, its gyros
@@ -82,7 +82,7 @@ class Sums:
         self._gaps_before = np.concatenate([[0], np.cumsum(gaps)])
 
     def between(self, start_s: FloatArray, end_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return angle and velocity gathered between times, shapes (..., 3); NaN across a gap or outside."""
+        """Return angle and velocity gathered between times; NaN across a gap or outside."""
         whole = self.is_whole(start_s, end_s)[..., None]
         angle, velocity = (
             self.at(end_s, sums) - self.at(start_s, sums) for sums in (self.angle_rad, self.velocity_mps)
@@ -138,7 +138,7 @@ def _thinned(time_s: FloatArray, step_s: float) -> Int64Array:
 
 
 def resting_rate_radps(steps: Steps) -> FloatArray:
-    """Return what the gyros show while nothing accelerates, shape (3,); zeros where that never is.
+    """Return what the gyros show while nothing accelerates; zeros where that never is.
 
     It is their error: at rest and in steady travel nothing turns for long.
     """

@@ -1,4 +1,4 @@
-"""Reasons to refuse a unit before its motion is looked at: a stuck axis, units that are not those of the topic."""
+"""Reasons to refuse a unit before its motion: a stuck axis, force in other units."""
 
 import numpy as np
 
@@ -33,7 +33,7 @@ def stuck_axis(imu: ImuIncrements) -> str:
 
 
 def _longest_stuck(time_s: FloatArray, same: FloatArray, moves: FloatArray, values: FloatArray) -> tuple[float, float]:
-    """Return the time of the longest run of one value while another axis changes, and the value."""
+    """Return length and value of the longest run of one value while another axis changes."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
     best = (0.0, 0.0)
     for start, end in zip(edges[::2], edges[1::2], strict=True):
