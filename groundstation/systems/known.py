@@ -62,6 +62,9 @@ class AircraftData:
         teach how the unit sits, and the acceptance groups flights.
     nav_start_utc : str
         When the INS began to navigate, ISO 8601, where the log does not show it; it may lie before the log.
+    imu_mounting_deg : three floats or None
+        Roll, pitch and yaw of the case of the inertial unit in the airframe: the attitude that the case has while the
+        airframe is level and points north. None: as the log tells or its motion shows.
     vehicle : str
         ``rolls``, ``flies``, ``walks`` or ``floats``; empty: as the log says or shows. What rolls is always on the
         ground: nothing need prove it.
@@ -85,6 +88,7 @@ class AircraftData:
     ins_serial: str = ""
     ins_alignment: str = ""
     nav_start_utc: str = ""
+    imu_mounting_deg: tuple[float, float, float] | None = number(None, -360.0, 360.0)
     vehicle: Literal["", VehicleKind] = ""
     always_on_ground: bool = False
 

@@ -266,8 +266,10 @@ def _settings_of(settings: HeadingSettings, aircraft: AircraftData) -> dict[str,
     for name, value in (
         asdict(settings) | {f"aircraft.{key}": value for key, value in asdict(aircraft).items()}
     ).items():
-        if isinstance(value, tuple):
+        if isinstance(value, tuple) and len(value) == 2:
             out[f"{name}.low"], out[f"{name}.high"] = value
+        elif isinstance(value, tuple):
+            out[name] = ", ".join(f"{one:g}" for one in value)
         elif value is not None:
             out[name] = value
     return out

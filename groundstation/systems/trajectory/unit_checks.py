@@ -1,0 +1,68 @@
+"""Reasons to refuse a unit before its motion: a stuck axis, force in other units."""
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray
+from groundstation.systems.trajectory.inputs import ImuIncrements
+from groundstation.systems.trajectory.mounting_settings import MountingSettings
+from groundstation.systems.trajectory.short_spans import GRAVITY_MPS2, QUIET_MPS2, Steps
+
+STUCK_S, STUCK_SHARE = 10.0, 0.2  # of the log: a shorter one is a gap of the sensor, which the ledger tells
+SAME = 1e-5  # relative: increments are logged in single precision
+FEWEST_CALM = 5
+AXES = tuple(f"{sensor} {axis}" for sensor in ("gyro", "accelerometer") for axis in "xyz")
+
+
+def stuck_axis(imu: ImuIncrements) -> str:
+    """Return why a unit with a stuck axis is refused; empty where none is.
+
+    An axis is stuck while its value stays the same though others change.
+    """
+    interval_s = imu.interval_s[:, None]
+    values = np.concatenate([imu.delta_angle_rad / interval_s, imu.delta_velocity_mps / interval_s], axis=1)
+    if len(values) < 3:
+        return ""
+    same = np.abs(np.diff(values, axis=0)) <= SAME * np.abs(values[1:]) + 1e-12
+    moves = ~same.all(axis=1)
+    limit_s = max(STUCK_S, STUCK_SHARE * float(imu.time_s[-1] - imu.time_s[0]))
+    for axis, name in enumerate(AXES):
+        length_s, value = _longest_stuck(imu.time_s, same[:, axis], moves, values[1:, axis])
+        if length_s >= limit_s:
+            return f"{name} is stuck: {value:.4g} for {length_s:.0f} s while other axes change"
+    return ""
+
+
+def _longest_stuck(time_s: FloatArray, same: FloatArray, moves: FloatArray, values: FloatArray) -> tuple[float, float]:
+    """Return length and value of the longest run of one value while another axis changes."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
+    best = (0.0, 0.0)
+    for start, end in zip(edges[::2], edges[1::2], strict=True):
+        length_s = float(time_s[end] - time_s[start])
+        if length_s > best[0] and moves[start:end].mean() > 0.5:
+            best = (length_s, float(values[start]))
+    return best
+
+
+def wrong_force(steps: Steps, settings: MountingSettings) -> str:
+    """Return why the specific force cannot be one in m/s2; empty where it can.
+
+    At rest and in steady travel it is gravity.
+    """
+    size = np.linalg.norm(steps.force_mps2, axis=1)
+    known = np.isfinite(size)
+    calm = known & (np.linalg.norm(steps.acceleration_mps2, axis=1) < QUIET_MPS2)
+    sizes = [float(np.median(size[part])) for part in (calm, known) if part.sum() >= FEWEST_CALM]
+    if not sizes:
+        return ""
+    found = min(sizes, key=lambda one: abs(np.log(max(one, 1e-9) / GRAVITY_MPS2)))
+    low, high = settings.gravity_range_mps2
+    if low <= found <= high:
+        return ""
+    told = f"accelerometers show {found:.3g} where gravity is {GRAVITY_MPS2:.2f} m/s2"
+    if low <= found * GRAVITY_MPS2 <= high:
+        return f"{told}: they are in g, not in m/s2"
+    if low <= found / GRAVITY_MPS2 <= high:
+        return f"{told}: they are multiplied by g twice"
+    if found < 0.2 * GRAVITY_MPS2:
+        return f"{told}: gravity has been taken off, or they are not specific force"
+    return f"{told}: wrong units, scale or a bias beyond use"
