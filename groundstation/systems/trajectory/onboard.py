@@ -61,7 +61,8 @@ class OnboardComparison:
 class _Output:
     """Output of the filter, NaN where not logged.
 
-    Roll, pitch, heading and velocity have shape (n, 3). ``plane_m`` is north and east of an origin that is not logged, where there is no latitude.
+    Roll, pitch, heading and velocity have shape (n, 3). ``plane_m`` is north and east of an origin that is not logged,
+    where there is no latitude.
     """
 
     time_s: FloatArray
