@@ -1,10 +1,8 @@
-"""Chapter on the best trajectory: doubt first, then its accuracy and what it says of the on-board filter."""
-
-from collections.abc import Mapping
+"""Chapter on the best trajectory: doubt first, then the on-board filter and the accuracy."""
 
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.gates import gate_grid
-from groundstation.chapters.parts import Cell, Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, kept
+from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Mark, Note, Part, Section, kept
 from groundstation.chapters.wording import (
     ABSENT,
     clock,
@@ -13,7 +11,6 @@ from groundstation.chapters.wording import (
     percent,
     significant,
     typeset,
-    with_full_stop,
 )
 from groundstation.results.flight import FlightResults
 from groundstation.systems.trajectory.answer import (
@@ -21,17 +18,18 @@ from groundstation.systems.trajectory.answer import (
     HeldOutRow,
     InnovationRow,
     OnboardError,
-    OutageRow,
     TrajectoryParameter,
-    TrajectoryState,
     UnitMounting,
 )
+from groundstation.systems.trajectory.claim_chapter import (
+    claim_of,
+    full_sentence,
+    inside_texts,
+    unit_sign_of,
+    wrong_texts,
+)
 from groundstation.systems.trajectory.wording_answer import (
-    accuracy_words,
-    error_words,
-    opening_error,
     places_of,
-    rounded,
     sentence_of,
     when,
     with_half,
@@ -39,15 +37,6 @@ from groundstation.systems.trajectory.wording_answer import (
 
 TITLE = "Best trajectory"
 LEAD = "Where the vehicle was, how it stood and where it pointed, by all data before and after, and how sure that is."
-MARKS: Mapping[TrajectoryState, Mark] = {
-    "accepted": Mark("good", "Accepted"),
-    "doubtful": Mark("warn", "Doubtful"),
-    "ambiguous": Mark("warn", "Ambiguous"),
-}
-WRONG = Mark("warn", "Filter wrong")
-DANGER_DEG = {"heading": 10.0, "roll": 5.0, "pitch": 5.0}  # surely wrong by so much
-STARTING_S = 30.0  # a filter that has just begun is still finding its heading
-MOST_TOLD = 3
 SOURCES = {
     "stated": "stated in the aircraft file",
     "logged": "logged",
@@ -89,53 +78,7 @@ def trajectory(results: FlightResults) -> Section | None:
         _raised(answer),
     ]
     headline = typeset(sentence_of(answer))
-    return Section("trajectory", TITLE, LEAD, kept(parts), headline, claim=_claim(answer), appendix=kept(appendix))
-
-
-# ------------------------------------------------------------------------------------------------------- the claim
-
-
-def _claim(answer: BestTrajectory) -> Claim:
-    figures = [*_figures(answer)]
-    worst = opening_error(answer)
-    if worst is not None:
-        row, span = worst
-        is_danger = (
-            abs(span.value) - span.half95 > DANGER_DEG.get(row.quantity, float("inf"))
-            and span.end_s - answer.start_s > STARTING_S
-        )
-        value = typeset(with_half(span.value, span.half95, row.unit))
-        remark = f"on-board {row.quantity} wrong {when(answer, span)}"
-        others = [text for text in _wrong_texts(answer) if text != error_words(answer, row, span)]
-        sentences = [_sentence(text) for text in (*others, f"best trajectory: {accuracy_words(answer)}")]
-        headline = _headline(error_words(answer, row, span))
-        return Claim(Rank.ONBOARD_ERROR, WRONG, headline, value, remark, sentences, figures, is_danger=is_danger)
-    mark, headline = MARKS[answer.state], _headline(sentence_of(answer))
-    if answer.state != "accepted":
-        return Claim(Rank.TRACK_OPEN, mark, headline, "", "", [_sentence(one) for one in answer.reasons], figures)
-    heading = answer.accuracy_of("heading")
-    value = "" if heading is None else f"± {rounded(heading.median_within95)}°"
-    sentences = [_sentence(text) for text in _inside_texts(answer)]
-    return Claim(Rank.TRACK, mark, headline, value, "heading, 95 %", sentences, figures)
-
-
-def _figures(answer: BestTrajectory) -> list[tuple[str, str, str]]:
-    found = []
-    for quantity, label in (("heading", "Heading"), ("tilt", "Tilt"), ("horizontal position", "Position")):
-        row = answer.accuracy_of(quantity)  # type: ignore[arg-type]
-        if row is not None and answer.state == "accepted":
-            found.append((label, f"± {number_with_unit(rounded(row.median_within95), unit_sign_of(row.unit))}", "95 %"))
-    longest = _outage_told(answer)
-    if longest is not None:
-        remark = f"without GNSS, smoothed, RMS of {longest.count}"
-        found.append((f"{longest.length_s:g} s", number(longest.smoothed_rms_m, 1, "m"), remark))
-    return found
-
-
-def _outage_told(answer: BestTrajectory) -> OutageRow | None:
-    """Return the replayed outage that stands for all: of a minute, or the longest."""
-    rows = [one for one in answer.outages if one.count]
-    return next((one for one in rows if one.length_s == 60.0), rows[-1] if rows else None)
+    return Section("trajectory", TITLE, LEAD, kept(parts), headline, claim=claim_of(answer), appendix=kept(appendix))
 
 
 # -------------------------------------------------------------------------------------------------- what it means
@@ -146,12 +89,12 @@ def _doubt(answer: BestTrajectory) -> list[Note]:
         return []
     if answer.state == "ambiguous":
         text = (
-            "Two headings explain this log nearly as well. The other one would turn every place of an antenna, every "
-            "velocity along the nose and every heading here: do not use them. Position and velocity hold."
+            "Two headings explain this log nearly as well: use none. The attitude shown here is by the first of them; "
+            "position and velocity rest on GNSS."
         )
     else:
         text = "Do not build on the sigmas of this chapter: a check of the log itself does not hold."
-    return [Note(text, "warn"), *(Note(_sentence(reason), "warn") for reason in answer.reasons)]
+    return [Note(text, "warn"), *(Note(full_sentence(reason), "warn") for reason in answer.reasons)]
 
 
 def _hypotheses(answer: BestTrajectory) -> Grid | None:
@@ -179,38 +122,10 @@ def _hypotheses(answer: BestTrajectory) -> Grid | None:
 def _told_of_filter(answer: BestTrajectory) -> list[Note]:
     if answer.state != "accepted" or answer.onboard is None:
         return []
-    wrong = _wrong_texts(answer)
+    wrong = wrong_texts(answer)
     if wrong:
-        return [Note(_sentence(text), "warn") for text in wrong]
-    return [Note(_sentence(text), "good") for text in _inside_texts(answer)]
-
-
-def _wrong_texts(answer: BestTrajectory) -> list[str]:
-    """Return what the on-board filter got wrong beyond 95 %, the worst of each quantity."""
-    rows = () if answer.onboard is None or answer.state != "accepted" else answer.onboard.rows
-    told = []
-    for row in rows:
-        if row.spans:
-            more = len(row.spans) - 1
-            also = f"; {more} more span{'s' * (more > 1)}" if more else ""
-            told.append(error_words(answer, row, row.spans[0]) + also)
-    worst = opening_error(answer)
-    if worst is not None:
-        first = error_words(answer, *worst)
-        told = [first, *(text for text in told if text != first and not text.startswith(f"{first};"))]
-    return told[:MOST_TOLD]
-
-
-def _inside_texts(answer: BestTrajectory) -> list[str]:
-    """Return that the on-board filter shows no error beyond 95 %, with what is left."""
-    if answer.onboard is None or answer.state != "accepted" or any(one.spans for one in answer.onboard.rows):
-        return []
-    left = [
-        f"{one.quantity} {significant(one.rms, 2)} {one.unit}"
-        for one in answer.onboard.rows
-        if one.quantity in ("heading", "roll", "pitch", "horizontal position")
-    ]
-    return [f"the on-board filter shows no error beyond 95 %; it differs by {', '.join(left)} (RMS)"]
+        return [Note(full_sentence(text), "warn") for text in wrong]
+    return [Note(full_sentence(text), "good") for text in inside_texts(answer)]
 
 
 # --------------------------------------------------------------------------------------------------------- tables
@@ -405,35 +320,13 @@ def _mounting(mounting: UnitMounting) -> str:
 # ---------------------------------------------------------------------------------------------------------- words
 
 
-def unit_sign_of(unit: str) -> str:
-    """Return a unit as a page writes it.
-
-    Examples
-    --------
-    >>> unit_sign_of("deg"), unit_sign_of("deg/s"), unit_sign_of("m/s")
-    ('°', '°/s', 'm/s')
-    """
-    return unit.replace("deg", "°").replace("sqrt(", "√(")
-
-
 def _with(value: float | None, unit: str, digits: int = 2) -> str:
     return number_with_unit(significant(value, digits), unit_sign_of(unit))
 
 
 def _signed(value: float, half: float, unit: str) -> str:
     places = places_of(half)
-    return number_with_unit(
-        f"{number(value, places)} ± {number(half, places)}", f" {unit_sign_of(unit)}".rstrip()
-    ).strip()
-
-
-def _sentence(text: str) -> str:
-    return with_full_stop(typeset(text))
-
-
-def _headline(text: str) -> str:
-    told = typeset(text)
-    return told[:1].upper() + told[1:]
+    return number_with_unit(f"{number(value, places)} ± {number(half, places)}", unit_sign_of(unit))
 
 
 def _capital(text: str) -> str:

@@ -1,10 +1,11 @@
-"""Plots of the best trajectory: map, sigmas, errors of the on-board filter, outages, separation, residuals, biases."""
+"""Plots of the best trajectory: map, attitude, sigmas, outages, separation, residuals."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from groundstation.base.angles import interpolate_heading, wrap_360
 from groundstation.base.ellipse import ELLIPSE_95, magnified, outlines
 from groundstation.base.geodesy import on_earth, plan_north_east_m
 from groundstation.base.quantiles import NORMAL_95
@@ -12,7 +13,7 @@ from groundstation.chapters.plots.common import has_values, span
 from groundstation.plots.axes import ZERO, time_axis
 from groundstation.plots.marks import AnyMark, Band, Curve, Dots, Floats, Outlines, Points, Role, Told
 from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
-from groundstation.plots.ranges import broken_at_gaps, broken_at_wrap, finite, symmetric, thin
+from groundstation.plots.ranges import broken_at_gaps, broken_at_wrap, symmetric, thin
 from groundstation.results.arrays.typed import Counts, Flags
 from groundstation.results.flight import FlightResults
 from groundstation.systems.trajectory.arrays import (
@@ -23,11 +24,10 @@ from groundstation.systems.trajectory.arrays import (
     TrajectorySeparation,
     TrajectoryTrack,
 )
+from groundstation.systems.trajectory.onboard_plots import PANEL_MM, onboard_attitude, onboard_motion, usual
 
-PANEL_MM = 26.0
 LARGEST_IN_METRES = 3000.0
 ELLIPSES = 24  # along the map
-USUAL_SHARE = 0.99  # of the values that an axis holds; a few far ones may leave it
 AXES: tuple[tuple[str, Role], ...] = (("north", "series 1"), ("east", "series 2"), ("down", "series 3"))
 BODY: tuple[tuple[str, Role], ...] = (("x", "series 1"), ("y", "series 2"), ("z", "series 3"))
 
@@ -101,34 +101,52 @@ def _rings(data: TrajectoryTrack, north: Floats, east: Floats, extent: float) ->
 
 
 def attitude(results: FlightResults) -> Plot | None:
-    """Return smoothed roll, pitch and heading over time, and the heading of a second hypothesis."""
+    """Return smoothed attitude over time beside that of the on-board filter.
+
+    The heading of a second hypothesis is drawn, too.
+    """
     data = results.rows_of(TrajectoryTrack)
     if data is None or not len(data):
         return None
+    theirs = onboard_attitude_deg(results)
     ends = time_axis(*span(data.time_s))
-    time_s, roll, pitch = _broken(data.time_s, data.segment, data.roll_deg, data.pitch_deg)
-    tilt = [
-        Curve(x=time_s, y=roll, role="series 1", name="roll"),
-        Curve(x=time_s, y=pitch, role="series 2", name="pitch"),
-    ]
-    headings: list[AnyMark] = []
-    if data.other_heading_deg is not None:
-        x, y = broken_at_wrap(*_broken(data.time_s, data.segment, data.other_heading_deg))
-        headings.append(Curve(x=x, y=y, role="unused", name="second hypothesis"))
-    x, y = broken_at_wrap(*_broken(data.time_s, data.segment, data.heading_deg))
-    headings.append(Curve(x=x, y=y, role="answer", name="smoothed" if headings else ""))
-    rows = (
-        Row((Panel([ZERO, *tilt], ends, Axis("tilt, °")),), PANEL_MM, shares_x=True),
-        Row((Panel(headings, ends, Axis("heading, °", low=0.0, high=360.0)),), PANEL_MM),
-    )
+    rows: list[Row] = []
+    smoothed = (("roll, °", data.roll_deg), ("pitch, °", data.pitch_deg), ("heading, °", data.heading_deg))
+    for place, (axis, values) in enumerate(smoothed):
+        is_heading = axis.startswith("heading")
+        marks: list[AnyMark] = [] if is_heading else [ZERO]
+        if theirs is not None and has_values(theirs[1][:, place]):
+            x, y = broken_at_wrap(*broken_at_gaps(theirs[0], theirs[1][:, place]))
+            marks.append(Curve(x=x, y=y, role="ins", name="on-board filter"))
+        if is_heading and data.other_heading_deg is not None:
+            x, y = broken_at_wrap(*_broken(data.time_s, data.segment, data.other_heading_deg))
+            marks.append(Curve(x=x, y=y, role="unused", name="second hypothesis"))
+        x, y = broken_at_wrap(*_broken(data.time_s, data.segment, values))
+        marks.append(Curve(x=x, y=y, role="answer", name="smoothed"))
+        height = Axis(axis, low=0.0, high=360.0) if is_heading else Axis(axis)
+        panel = Panel(marks, ends, height, legend="above" if is_heading or not rows else "")
+        rows.append(Row((panel,), PANEL_MM, shares_x=not is_heading))
     return Plot(
         "trajectory.attitude",
         "Attitude",
-        "Smoothed attitude of the body.",
+        "Smoothed attitude of the body; the on-board filter's with its constant turn taken off.",
         "Roll, pitch and heading over flight time.",
-        rows,
-        ("trajectory_track",),
+        tuple(rows),
+        ("trajectory_track", "trajectory_onboard"),
     )
+
+
+def onboard_attitude_deg(results: FlightResults) -> tuple[Floats, Floats] | None:
+    """Return times and attitude of the on-board filter, its constant turn taken off."""
+    data, onboard = results.rows_of(TrajectoryTrack), results.rows_of(TrajectoryOnboard)
+    if data is None or onboard is None or not len(onboard):
+        return None
+    roll, pitch = (np.interp(onboard.time_s, data.time_s, one) for one in (data.roll_deg, data.pitch_deg))
+    heading = interpolate_heading(onboard.time_s, data.time_s, data.heading_deg)
+    errors = np.column_stack([onboard.roll_deg, onboard.pitch_deg, onboard.heading_deg])
+    told = np.column_stack([roll, pitch, heading]) + errors
+    told[:, 2] = wrap_360(told[:, 2])
+    return onboard.time_s, told
 
 
 def sigmas(results: FlightResults) -> Plot | None:
@@ -160,64 +178,6 @@ def sigmas(results: FlightResults) -> Plot | None:
         groups,
         "trajectory_track",
         from_zero=True,
-    )
-
-
-def onboard_attitude(results: FlightResults) -> Plot | None:
-    """Return errors of heading, roll and pitch of the on-board filter with the 95 % of the smoothed solution."""
-    data = results.rows_of(TrajectoryOnboard)
-    if data is None:
-        return None
-    shown = (
-        ("heading error, °", data.heading_deg, data.heading_sigma_deg),
-        ("roll error, °", data.roll_deg, data.roll_sigma_deg),
-        ("pitch error, °", data.pitch_deg, data.pitch_sigma_deg),
-    )
-    return _errors(data, shown, "attitude", "Errors of the on-board filter: heading, roll, pitch")
-
-
-def onboard_motion(results: FlightResults) -> Plot | None:
-    """Return errors of velocity and place of the on-board filter with the 95 % of the smoothed solution."""
-    data = results.rows_of(TrajectoryOnboard)
-    if data is None:
-        return None
-    one_axis = 0.5**0.5
-    speed, place = one_axis * data.horizontal_velocity_sigma_mps, one_axis * data.horizontal_position_sigma_m
-    shown = (
-        ("north velocity error, m/s", data.velocity_north_mps, speed),
-        ("east velocity error, m/s", data.velocity_east_mps, speed),
-        ("down velocity error, m/s", data.velocity_down_mps, data.vertical_velocity_sigma_mps),
-        ("north error, m", data.position_north_m, place),
-        ("east error, m", data.position_east_m, place),
-        ("height error, m", data.height_m, data.vertical_position_sigma_m),
-    )
-    return _errors(data, shown, "motion", "Errors of the on-board filter: velocity, place")
-
-
-def _errors(data: TrajectoryOnboard, shown: Sequence[tuple[str, Floats, Floats]], name: str, title: str) -> Plot | None:
-    known = [one for one in shown if has_values(one[1])]
-    if not known:
-        return None
-    ends = time_axis(*span(data.time_s))
-    rows: list[Row] = []
-    for axis, values, sigma in known:
-        time_s, error, half = broken_at_gaps(data.time_s, values, NORMAL_95 * sigma)
-        marks: list[AnyMark] = [
-            Band(x=time_s, low=-half, high=half, role="answer", name="95 % of the smoothed solution"),
-            ZERO,
-            Curve(x=time_s, y=error, role="ins", name="on-board − smoothed"),
-        ]
-        low, high = symmetric(np.append(_usual(values), _usual(half)), 1e-3)
-        panel = Panel(marks, ends, Axis(axis, low=low, high=high), legend="" if rows else "above")
-        rows.append(Row((panel,), PANEL_MM, shares_x=axis != known[-1][0]))
-    return Plot(
-        f"trajectory.onboard_{name}",
-        title,
-        "On-board filter minus smoothed solution, each a median over a second; what is constant all through the log is "
-        "taken off. Beyond the band the filter is wrong.",
-        f"{title} over flight time, with the 95 % band of the smoothed solution.",
-        tuple(rows),
-        ("trajectory_onboard",),
     )
 
 
@@ -319,7 +279,7 @@ def residuals(results: FlightResults) -> Plot | None:
         for name, chosen, role in kinds:
             if (chosen & np.isfinite(values)).any():
                 marks.append(Dots(x=data.time_s, y=np.where(chosen, values, np.nan), role=role, name=name))
-        low, high = symmetric(_usual(values), 1e-3)
+        low, high = symmetric(usual(values), 1e-3)
         panel = Panel(marks, ends, Axis(axis, low=low, high=high), legend="" if rows else "above")
         rows.append(Row((panel,), 20.0, shares_x=axis != known[-1][0]))
     return Plot(
@@ -377,7 +337,7 @@ def _over_time(
     from_zero: bool = False,
     height_mm: float = PANEL_MM,
 ) -> Plot | None:
-    """Return panels of lines over flight time, a panel each group; None where none has a value."""
+    """Return a panel of lines each group over flight time; None where none has a value."""
     shown = [(axis, [line for line in lines if has_values(line.values)]) for axis, lines in groups]
     shown = [(axis, lines) for axis, lines in shown if lines]
     if not shown:
@@ -394,8 +354,8 @@ def _over_time(
             if line.sigma is not None:
                 bands.append(Band(x=x, low=y - wide, high=y + wide, role=line.role))
             marks.append(Curve(x=x, y=y, role=line.role, name=line.name if len(lines) > 1 else ""))
-        usual = _usual(np.concatenate([line.values for line in lines]))
-        low, high = (0.0, 1.15 * float(usual.max(initial=1e-6))) if from_zero else symmetric(usual, 1e-6)
+        held = usual(np.concatenate([line.values for line in lines]))
+        low, high = (0.0, 1.15 * float(held.max(initial=1e-6))) if from_zero else symmetric(held, 1e-6)
         panel = Panel([*bands, *marks], ends, Axis(axis, low=low, high=high), legend="above" if len(lines) > 1 else "")
         rows.append(Row((panel,), height_mm, shares_x=axis != shown[-1][0]))
     return Plot(name, title, caption, alt, tuple(rows), (numbers,))
@@ -407,16 +367,6 @@ def _broken(time_s: Floats, segment: Counts | None, *values: Floats) -> tuple[Fl
         return broken_at_gaps(time_s, *values)
     after = np.flatnonzero(np.diff(segment) != 0) + 1
     return np.insert(time_s, after, time_s[after]), *(np.insert(one, after, np.nan) for one in values)
-
-
-def _usual(values: Floats) -> Floats:
-    """Return values without the few that are far beyond the others."""
-    known = finite(values)
-    if not len(known):
-        return known
-    size = np.abs(known)
-    most = float(np.quantile(size, USUAL_SHARE))
-    return known if size.max() < 4.0 * most else np.asarray(known[size <= 1.5 * most])
 
 
 PLOTS: Mapping[str, Describe] = {

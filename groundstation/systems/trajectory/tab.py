@@ -1,4 +1,4 @@
-"""Tab on the best trajectory: attitude and track beside the on-board filter's, sigmas, checks, the chapter."""
+"""Tab on the best trajectory: beside the on-board filter, in space, sigmas, checks."""
 
 import rerun.blueprint as rrb
 
@@ -6,6 +6,7 @@ from groundstation.chapters.markdown import markdown
 from groundstation.results.flight import FlightResults
 from groundstation.systems.trajectory.answer import BestTrajectory
 from groundstation.systems.trajectory.chapter import trajectory as chapter
+from groundstation.systems.trajectory.space_tab import space
 from groundstation.viewer.plot_views import panels_of, plot_of
 from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.views import document
@@ -34,10 +35,9 @@ def trajectory(recorder: Recorder, results: FlightResults) -> rrb.Container | No
         views = [view for one in figures for view in panels_of(recorder, plot_of(recorder, one, results))]
         if views:
             pages.append(rrb.Vertical(contents=views, name=name))
-    left: list[rrb.View | rrb.Container] = [rrb.Tabs(contents=pages, active_tab=0)] if pages else []
-    right: list[rrb.View | rrb.Container] = [
-        *panels_of(recorder, plot_of(recorder, "trajectory.map", results)),
-        document("What was found", "trajectory/answer"),
-    ]
-    columns = [*left, rrb.Vertical(contents=right, row_shares=[2.0, 3.0][: len(right)])]
+    in_space = space(recorder, results)
+    text = document("What was found", "trajectory/answer")
+    right: list[rrb.View | rrb.Container] = [text] if in_space is None else [in_space, text]
+    columns: list[rrb.View | rrb.Container] = [rrb.Tabs(contents=pages, active_tab=0)] if pages else []
+    columns.append(rrb.Vertical(contents=right) if len(right) > 1 else text)
     return rrb.Horizontal(contents=columns, column_shares=[3.0, 2.0][: len(columns)], name="Best trajectory")

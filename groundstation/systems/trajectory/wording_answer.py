@@ -1,4 +1,4 @@
-"""Words for the best trajectory: its accuracy, its state, what the on-board filter got wrong."""
+"""Words for the best trajectory: state, accuracy, errors of the on-board filter."""
 
 import math
 
@@ -20,7 +20,7 @@ SHORT: tuple[tuple[Quantity, str], ...] = (
 
 
 def sentence_of(answer: BestTrajectory) -> str:
-    """Return one sentence: the doubt where there is one, else the filter's error, else the accuracy."""
+    """Return one sentence: the doubt, else the filter's error, else the accuracy."""
     if answer.state == "ambiguous":
         first, second = (f"{one.start_heading_deg:.0f}" for one in answer.hypotheses[:2])
         return f"two headings explain the log, {first} or {second} deg at the start: neither is claimed"
@@ -88,7 +88,7 @@ def with_half(value: float, half: float, unit: str) -> str:
     ('2.1 +- 0.3 deg', '-18.3 +- 1.2 m', '151 +- 32 m')
     """
     places = places_of(half)
-    return f"{value:.{places}f} +- {half:.{places}f} {unit}"
+    return f"{round(value, places) + 0.0:.{places}f} +- {half:.{places}f} {unit}".strip()
 
 
 def rounded(value: float) -> str:
