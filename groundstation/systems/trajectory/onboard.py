@@ -34,11 +34,12 @@ from groundstation.systems.trajectory.onboard_offsets import (
     time_shift,
 )
 from groundstation.systems.trajectory.onboard_spans import wrong_spans
-from groundstation.systems.trajectory.sampling import at_times, thinned
+from groundstation.systems.trajectory.sampling import at_times, every, thinned
 from groundstation.systems.trajectory.solution import FloatArray, TrackOfStates
 from groundstation.tables.table import Flight, Table
 
 STEP_S = 0.1  # faster output says no more
+STATE_STEP_S = 0.04  # states between which ours is a straight line
 MOST_SAMPLES = 100_000
 BIN_S, MOST_BINS = 1.0, 20_000  # errors are judged and shown as medians over it
 FEWEST = 30  # samples beside the track
@@ -111,7 +112,7 @@ def compare_onboard(track: TrackOfStates, flight: Flight, topic: str) -> Onboard
 
     It ignores a filter that is wrong by the same all through the log: that is taken for mounting.
     """
-    output = _output(flight, topic)
+    output, track = _output(flight, topic), every(track, STATE_STEP_S)
     if output is None or np.isfinite(at_times(track, output.time_s).heading_deg).sum() < FEWEST:
         return None
     delay = _delay(track, output)
