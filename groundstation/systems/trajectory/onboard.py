@@ -51,7 +51,7 @@ NOTHING = Constant(0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class OnboardComparison:
+class ComparedFilter:
     """Errors by quantity, and the columns of their figure."""
 
     errors: OnboardErrors
@@ -89,7 +89,7 @@ class _Errors:
     height_offset: Constant
 
 
-def compare_onboard(track: TrackOfStates, flight: Flight, topic: str) -> OnboardComparison | None:
+def compare_onboard(track: TrackOfStates, flight: Flight, topic: str) -> ComparedFilter | None:
     """Compare the output of an on-board filter with the smoothed solution.
 
     Parameters
@@ -102,7 +102,7 @@ def compare_onboard(track: TrackOfStates, flight: Flight, topic: str) -> Onboard
 
     Returns
     -------
-    OnboardComparison, or None where fewer than 30 samples stand beside the track.
+    ComparedFilter, or None where fewer than 30 samples stand beside the track.
 
     Notes
     -----
@@ -124,7 +124,7 @@ def compare_onboard(track: TrackOfStates, flight: Flight, topic: str) -> Onboard
         return None
     is_seen = np.isfinite(delay.sigma)
     errors = OnboardErrors(topic, rows, delay.value if is_seen else None, delay.sigma if is_seen else None)
-    return OnboardComparison(errors, figure)
+    return ComparedFilter(errors, figure)
 
 
 def _output(flight: Flight, topic: str) -> _Output | None:

@@ -7,7 +7,7 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.attitude import rotation_n_from_b
 from groundstation.base.records import HEADING_IS_TRACK
 from groundstation.systems.trajectory.answer import OnboardError, OnboardErrors, Quantity
-from groundstation.systems.trajectory.onboard import OnboardComparison, compare_onboard
+from groundstation.systems.trajectory.onboard import ComparedFilter, compare_onboard
 from groundstation.systems.trajectory.sampling import at_times
 from groundstation.tables.table import Flight
 from tests.systems.trajectory.made import onboard, track
@@ -15,7 +15,7 @@ from tests.systems.trajectory.made import onboard, track
 TRACK = track()
 
 
-def compared(flight: Flight, of: object = TRACK) -> OnboardComparison:
+def compared(flight: Flight, of: object = TRACK) -> ComparedFilter:
     """The comparison, which must be there."""
     found = compare_onboard(of, flight, "ins")  # type: ignore[arg-type]
     assert found is not None

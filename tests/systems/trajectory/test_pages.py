@@ -1,9 +1,11 @@
 """Chapter, figures and tab of made answers in every state: what is told first, and what is not told."""
 
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from groundstation.plots.plot import Plot
 from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults, NotAssessable
 from groundstation.results.manifest import Manifest
+from groundstation.results.schema import summary_schema
 from groundstation.systems.system import Systems
 from groundstation.systems.trajectory.answer import BestTrajectory, OnboardErrors, WrongSpan
 from groundstation.systems.trajectory.chapter import trajectory
@@ -175,6 +178,17 @@ def test_an_answer_comes_back_as_it_was_saved(name: str, tmp_path: Path) -> None
     assert [one.quantity for one in back.accuracy] == [one.quantity for one in answer.accuracy]
     assert back.onboard is None or isinstance(back.onboard, OnboardErrors)
     assert trajectory(found) is not None
+
+
+@pytest.mark.parametrize("name", ANSWERS)
+def test_what_is_saved_obeys_the_schema_of_its_types(name: str, tmp_path: Path) -> None:
+    save(tmp_path / "a", results_of(ANSWERS[name]), Manifest())
+    saved = json.loads((tmp_path / "a" / "summary.json").read_text(encoding="utf-8"))
+    schema = summary_schema({"trajectory": BestTrajectory})
+    jsonschema.Draft202012Validator(schema).validate(saved)
+    saved["results"]["trajectory"]["outages"] = [{"length_s": -1.0}]
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.Draft202012Validator(schema).validate(saved)
 
 
 @pytest.mark.parametrize("name", ["accepted", "ambiguous", "without_filter", "short"])
