@@ -101,7 +101,7 @@ def inside_texts(answer: BestTrajectory) -> list[str]:
         for one in answer.onboard.rows
         if one.quantity in ("heading", "roll", "pitch", "horizontal position")
     ]
-    return [f"the on-board filter shows no error beyond 95 %; it differs by {', '.join(left)} (RMS)"]
+    return [f"the on-board filter is nowhere wrong beyond 95 % for two seconds; it differs by {', '.join(left)} (RMS)"]
 
 
 def full_sentence(text: str) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 
 from groundstation.base.angles import mean_heading, wrap_180
 from groundstation.base.attitude import rotation_n_from_b
-from groundstation.base.geodesy import north_east_m
+from groundstation.base.geodesy import has_position, north_east_m
 from groundstation.base.records import HEADING_IS_TRACK
 from groundstation.methods.intervals import effective_samples
 from groundstation.systems.trajectory.answer import (
@@ -139,12 +139,14 @@ def _output(flight: Flight, topic: str) -> _Output | None:
     height = table.values("altitude_ellipsoid_m")
     for values in (table.values("altitude_msl_m"), -table.values("position_down_m")):
         height = height if np.isfinite(height).any() else values
+    latitude, longitude = table.values("latitude_deg"), table.values("longitude_deg")
+    is_place = has_position(latitude, longitude)
     return _Output(
         flight.seconds(table.time_ns),
         np.column_stack([table.values("roll_deg"), table.values("pitch_deg"), heading]),
         np.column_stack([table.values(f"velocity_{axis}_mps") for axis in ("north", "east", "down")]),
-        table.values("latitude_deg"),
-        table.values("longitude_deg"),
+        np.where(is_place, latitude, np.nan),
+        np.where(is_place, longitude, np.nan),
         height,
         np.column_stack([table.values(f"position_{axis}_m") for axis in ("north", "east")]),
     )

@@ -131,6 +131,14 @@ def test_a_place_from_an_unknown_origin_is_compared() -> None:
     assert found.offset_cause == "datum" and found.offset == pytest.approx(500.0, rel=0.02)
 
 
+def test_a_place_that_is_no_fix_is_no_error() -> None:
+    flight = onboard(TRACK)
+    late = flight.time_s("ins") > 60.0
+    places = {name: np.where(late, flight["ins"].values(name), 0.0) for name in ("latitude_deg", "longitude_deg")}
+    found = row(compared(onboard(TRACK, **places)).errors, "horizontal position")
+    assert found.spans == () and found.rms < 0.1 and found.offset_cause == ""
+
+
 def test_a_track_told_as_heading_is_not_compared() -> None:
     flight = onboard(TRACK)
     told = Flight(dict(flight.tables), {f"{HEADING_IS_TRACK}.ins.true_heading_deg": "yes"})
