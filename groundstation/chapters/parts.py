@@ -128,15 +128,18 @@ class Rank(IntEnum):
     FORECAST = 3
     LANDING = 4
     REFERENCE = 5
-    HEALTH = 6  # of an autopilot and its filter
-    GROUND_RUNS = 7
-    GNSS = 8  # reception
-    HEADING_OPEN = 9  # undecided, too little taxi, or partly from taxi after the flight
-    MAGNETIC_OPEN = 10
-    INERTIAL_OPEN = 11  # aided by GNSS, or not known whether
-    LATENCY = 12
-    LANDING_OPEN = 13  # flown, but no gate height passed
-    OTHER = 14
+    ONBOARD_ERROR = 6  # of the filter on board, beyond the 95 % of a better solution
+    HEALTH = 7  # of an autopilot and its filter
+    GROUND_RUNS = 8
+    GNSS = 9  # reception
+    TRACK = 10  # the best one, and how sure it is
+    HEADING_OPEN = 11  # undecided, too little taxi, or partly from taxi after the flight
+    MAGNETIC_OPEN = 12
+    INERTIAL_OPEN = 13  # aided by GNSS, or not known whether
+    TRACK_OPEN = 14  # doubtful or ambiguous
+    LATENCY = 15
+    LANDING_OPEN = 16  # flown, but no gate height passed
+    OTHER = 17
 
 
 @dataclass(frozen=True)

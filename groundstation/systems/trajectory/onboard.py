@@ -11,7 +11,7 @@ import numpy as np
 
 from groundstation.base.angles import mean_heading, wrap_180
 from groundstation.base.attitude import rotation_n_from_b
-from groundstation.base.geodesy import north_east_m
+from groundstation.base.geodesy import has_position, north_east_m
 from groundstation.base.records import HEADING_IS_TRACK
 from groundstation.methods.intervals import effective_samples
 from groundstation.systems.trajectory.answer import (
@@ -34,11 +34,12 @@ from groundstation.systems.trajectory.onboard_offsets import (
     time_shift,
 )
 from groundstation.systems.trajectory.onboard_spans import wrong_spans
-from groundstation.systems.trajectory.sampling import at_times, thinned
+from groundstation.systems.trajectory.sampling import at_times, every, thinned
 from groundstation.systems.trajectory.solution import FloatArray, TrackOfStates
 from groundstation.tables.table import Flight, Table
 
 STEP_S = 0.1  # faster output says no more
+STATE_STEP_S = 0.04  # states between which ours is a straight line
 MOST_SAMPLES = 100_000
 BIN_S, MOST_BINS = 1.0, 20_000  # errors are judged and shown as medians over it
 FEWEST = 30  # samples beside the track
@@ -50,7 +51,7 @@ NOTHING = Constant(0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class OnboardComparison:
+class ComparedFilter:
     """Errors by quantity, and the columns of their figure."""
 
     errors: OnboardErrors
@@ -61,7 +62,8 @@ class OnboardComparison:
 class _Output:
     """Output of the filter, NaN where not logged.
 
-    Roll, pitch, heading and velocity have shape (n, 3). ``plane_m`` is north and east of an origin that is not logged, where there is no latitude.
+    Roll, pitch, heading and velocity have shape (n, 3). ``plane_m`` is north and east of an origin that is not logged,
+    where there is no latitude.
     """
 
     time_s: FloatArray
@@ -87,7 +89,7 @@ class _Errors:
     height_offset: Constant
 
 
-def compare_onboard(track: TrackOfStates, flight: Flight, topic: str) -> OnboardComparison | None:
+def compare_onboard(track: TrackOfStates, flight: Flight, topic: str) -> ComparedFilter | None:
     """Compare the output of an on-board filter with the smoothed solution.
 
     Parameters
@@ -100,7 +102,7 @@ def compare_onboard(track: TrackOfStates, flight: Flight, topic: str) -> Onboard
 
     Returns
     -------
-    OnboardComparison, or None where fewer than 30 samples stand beside the track.
+    ComparedFilter, or None where fewer than 30 samples stand beside the track.
 
     Notes
     -----
@@ -110,7 +112,7 @@ def compare_onboard(track: TrackOfStates, flight: Flight, topic: str) -> Onboard
 
     It ignores a filter that is wrong by the same all through the log: that is taken for mounting.
     """
-    output = _output(flight, topic)
+    output, track = _output(flight, topic), every(track, STATE_STEP_S)
     if output is None or np.isfinite(at_times(track, output.time_s).heading_deg).sum() < FEWEST:
         return None
     delay = _delay(track, output)
@@ -122,7 +124,7 @@ def compare_onboard(track: TrackOfStates, flight: Flight, topic: str) -> Onboard
         return None
     is_seen = np.isfinite(delay.sigma)
     errors = OnboardErrors(topic, rows, delay.value if is_seen else None, delay.sigma if is_seen else None)
-    return OnboardComparison(errors, figure)
+    return ComparedFilter(errors, figure)
 
 
 def _output(flight: Flight, topic: str) -> _Output | None:
@@ -137,12 +139,14 @@ def _output(flight: Flight, topic: str) -> _Output | None:
     height = table.values("altitude_ellipsoid_m")
     for values in (table.values("altitude_msl_m"), -table.values("position_down_m")):
         height = height if np.isfinite(height).any() else values
+    latitude, longitude = table.values("latitude_deg"), table.values("longitude_deg")
+    is_place = has_position(latitude, longitude)
     return _Output(
         flight.seconds(table.time_ns),
         np.column_stack([table.values("roll_deg"), table.values("pitch_deg"), heading]),
         np.column_stack([table.values(f"velocity_{axis}_mps") for axis in ("north", "east", "down")]),
-        table.values("latitude_deg"),
-        table.values("longitude_deg"),
+        np.where(is_place, latitude, np.nan),
+        np.where(is_place, longitude, np.nan),
         height,
         np.column_stack([table.values(f"position_{axis}_m") for axis in ("north", "east")]),
     )

@@ -11,7 +11,7 @@ from groundstation.systems.trajectory.solution import FloatArray
 
 CORRELATION_S = 60.0  # errors of the smoothed solution last so long: a log has so many independent looks at it
 JOINED_S = 10.0  # two spans with less between them are one
-LEAST_S = 5.0  # a shorter one is an outlier
+LEAST_S = 2.0  # a shorter one is an outlier
 MOST_SPANS = 10
 HALF = 0.5  # of the least error that is told: below it a span ends
 

@@ -36,6 +36,14 @@ def at_times(track: TrackOfStates, time_s: FloatArray) -> TrackOfStates:
     return TrackOfStates(time_s=np.asarray(time_s, dtype=np.float64), segment=segment, **found)
 
 
+def every(track: TrackOfStates, step_s: float) -> TrackOfStates:
+    """Return the states that are at least a step apart."""
+    rows = np.flatnonzero(thinned(track.time_s, step_s))
+    if len(rows) == len(track):
+        return track
+    return TrackOfStates(**{item.name: getattr(track, item.name)[rows] for item in fields(track)})
+
+
 def thinned(time_s: FloatArray, step_s: float) -> BoolArray:
     """Choose samples that are at least a step apart, to a tenth of the step; increasing times.
 

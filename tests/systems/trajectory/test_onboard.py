@@ -7,7 +7,7 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.attitude import rotation_n_from_b
 from groundstation.base.records import HEADING_IS_TRACK
 from groundstation.systems.trajectory.answer import OnboardError, OnboardErrors, Quantity
-from groundstation.systems.trajectory.onboard import OnboardComparison, compare_onboard
+from groundstation.systems.trajectory.onboard import ComparedFilter, compare_onboard
 from groundstation.systems.trajectory.sampling import at_times
 from groundstation.tables.table import Flight
 from tests.systems.trajectory.made import onboard, track
@@ -15,7 +15,7 @@ from tests.systems.trajectory.made import onboard, track
 TRACK = track()
 
 
-def compared(flight: Flight, of: object = TRACK) -> OnboardComparison:
+def compared(flight: Flight, of: object = TRACK) -> ComparedFilter:
     """The comparison, which must be there."""
     found = compare_onboard(of, flight, "ins")  # type: ignore[arg-type]
     assert found is not None
@@ -129,6 +129,14 @@ def test_a_place_from_an_unknown_origin_is_compared() -> None:
     moved = onboard(TRACK, latitude_deg=None, longitude_deg=None, position_north_m=north, position_east_m=east)
     found = row(compared(moved).errors, "horizontal position")
     assert found.offset_cause == "datum" and found.offset == pytest.approx(500.0, rel=0.02)
+
+
+def test_a_place_that_is_no_fix_is_no_error() -> None:
+    flight = onboard(TRACK)
+    late = flight.time_s("ins") > 60.0
+    places = {name: np.where(late, flight["ins"].values(name), 0.0) for name in ("latitude_deg", "longitude_deg")}
+    found = row(compared(onboard(TRACK, **places)).errors, "horizontal position")
+    assert found.spans == () and found.rms < 0.1 and found.offset_cause == ""
 
 
 def test_a_track_told_as_heading_is_not_compared() -> None:

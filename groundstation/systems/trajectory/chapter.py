@@ -1,0 +1,333 @@
+"""Chapter on the best trajectory: doubt first, then the on-board filter and the accuracy."""
+
+from groundstation.chapters.assessed import without_answer
+from groundstation.chapters.gates import gate_grid
+from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Mark, Note, Part, Section, kept
+from groundstation.chapters.wording import (
+    ABSENT,
+    clock,
+    number,
+    number_with_unit,
+    percent,
+    significant,
+    typeset,
+)
+from groundstation.results.flight import FlightResults
+from groundstation.systems.trajectory.answer import (
+    BestTrajectory,
+    HeldOutRow,
+    InnovationRow,
+    OnboardError,
+    TrajectoryParameter,
+    UnitMounting,
+)
+from groundstation.systems.trajectory.claim_chapter import (
+    claim_of,
+    full_sentence,
+    inside_texts,
+    unit_sign_of,
+    wrong_texts,
+)
+from groundstation.systems.trajectory.wording_answer import (
+    places_of,
+    sentence_of,
+    when,
+    with_half,
+)
+
+TITLE = "Best trajectory"
+LEAD = "Where the vehicle was, how it stood and where it pointed, by all data before and after, and how sure that is."
+SOURCES = {
+    "stated": "stated in the aircraft file",
+    "logged": "logged",
+    "found": "found from the log",
+    "case": "not known",
+}
+MOTIONS = {"rolls": "rolls", "flies": "flies", "walks": "walks", "floats": "floats"}
+
+
+def trajectory(results: FlightResults) -> Section | None:
+    """Return the chapter; None when the flight was not assessed and no reason is known."""
+    answer = results.answer(BestTrajectory)
+    if answer is None:
+        return without_answer(results, "trajectory", TITLE, LEAD)
+    parts: list[Part | None] = [
+        *_doubt(answer),
+        _hypotheses(answer),
+        *_told_of_filter(answer),
+        _accuracy(answer),
+        Figure("trajectory.map"),
+        Figure("trajectory.onboard_attitude"),
+        Figure("trajectory.onboard_motion"),
+        _onboard(answer),
+        _outages(answer),
+        Figure("trajectory.outages"),
+        _checks(answer),
+        _parameters(answer),
+    ]
+    appendix: list[Part | None] = [
+        _basis(answer),
+        gate_grid(answer.gates),
+        Figure("trajectory.sigmas"),
+        Figure("trajectory.separation"),
+        _separation(answer),
+        Figure("trajectory.residuals"),
+        Figure("trajectory.biases"),
+        Figure("trajectory.attitude"),
+        _noise(answer),
+        _raised(answer),
+    ]
+    headline = typeset(sentence_of(answer))
+    return Section("trajectory", TITLE, LEAD, kept(parts), headline, claim=claim_of(answer), appendix=kept(appendix))
+
+
+# -------------------------------------------------------------------------------------------------- what it means
+
+
+def _doubt(answer: BestTrajectory) -> list[Note]:
+    if answer.state == "accepted":
+        return []
+    if answer.state == "ambiguous":
+        text = (
+            "Two headings explain this log nearly as well: use none. The attitude shown here is by the first of them; "
+            "position and velocity rest on GNSS."
+        )
+    else:
+        text = "Do not build on the sigmas of this chapter: a check of the log itself does not hold."
+    return [Note(text, "warn"), *(Note(full_sentence(reason), "warn") for reason in answer.reasons)]
+
+
+def _hypotheses(answer: BestTrajectory) -> Grid | None:
+    if answer.state != "ambiguous" or len(answer.hypotheses) < 2:
+        return None
+    heads = (
+        Head("Hypothesis"),
+        Head("Heading at the start", True),
+        Head("At the end", True),
+        Head("Below the best", True),
+    )
+    rows = [
+        (
+            "shown here" if place == 0 else "other",
+            number(one.start_heading_deg, 1, "°"),
+            number(one.end_heading_deg, 1, "°"),
+            number(one.below_best, 1),
+        )
+        for place, one in enumerate(answer.hypotheses)
+    ]
+    caption = "Below the best: log-likelihood; a difference above 10 would decide."
+    return Grid("Hypotheses of the heading", heads, rows, caption)
+
+
+def _told_of_filter(answer: BestTrajectory) -> list[Note]:
+    if answer.state != "accepted" or answer.onboard is None:
+        return []
+    wrong = wrong_texts(answer)
+    if wrong:
+        return [Note(full_sentence(text), "warn") for text in wrong]
+    return [Note(full_sentence(text), "good") for text in inside_texts(answer)]
+
+
+# --------------------------------------------------------------------------------------------------------- tables
+
+
+def _accuracy(answer: BestTrajectory) -> Grid | None:
+    rows = [
+        (
+            _capital(one.quantity),
+            _with(one.median_within95, one.unit),
+            _with(one.median_sigma, one.unit),
+            _with(one.worst_sigma, one.unit),
+            clock(one.worst_s),
+        )
+        for one in answer.accuracy
+        if not (one.quantity == "heading" and answer.state == "ambiguous")
+    ]
+    heads = (
+        *(Head("Quantity"), Head("95 % within", True), Head("σ, median", True), Head("σ, worst", True)),
+        Head("Worst at", True),
+    )
+    raised = [one for one in answer.raised if one.factor > 1.0]
+    caption = "Smoothed. Horizontal: radius, and the root of the sum of both variances."
+    if raised:
+        factors = ", ".join(f"{one.name} {one.factor:.2f}" for one in raised)
+        caption += f" Sigmas are raised as the log's own checks ask for: {factors}."
+    return Grid("Accuracy", heads, rows, caption, ("trajectory_track",)) if rows else None
+
+
+def _onboard(answer: BestTrajectory) -> Grid | None:
+    if answer.onboard is None:
+        return None
+    is_sure = answer.state == "accepted"
+    heads = (
+        *(Head("Quantity"), Head("Constant, no error of it", True), Head("Cause")),
+        *(Head("RMS of the rest", True), Head("σ of the smoothed solution", True), Head("Wrong beyond 95 %")),
+    )
+    rows = [_onboard_row(answer, one, is_sure=is_sure) for one in answer.onboard.rows]
+    caption = "Output minus smoothed solution. What is constant all through the log is mounting, antenna or datum."
+    if answer.onboard.delay_s is not None and answer.onboard.delay_sigma_s is not None:
+        delay = with_half(answer.onboard.delay_s, 1.96 * answer.onboard.delay_sigma_s, "s")
+        caption += f" Its stamps are later than those of the inertial unit by {typeset(delay)}; that is taken off."
+    if not is_sure:
+        caption += " Spans are not told: the sigmas are not sure enough to blame the filter."
+    return Grid(
+        f"Errors of the on-board filter ({answer.onboard.topic})", heads, rows, caption, ("trajectory_onboard",)
+    )
+
+
+def _onboard_row(answer: BestTrajectory, row: OnboardError, *, is_sure: bool) -> tuple[Cell, ...]:
+    constant = ABSENT
+    if row.offset is not None and row.offset_sigma is not None:
+        constant = typeset(with_half(row.offset, 1.96 * row.offset_sigma, row.unit))
+    wrong: Cell = Mark("good", "nowhere") if is_sure else ABSENT
+    if is_sure and row.spans:
+        span = row.spans[0]
+        more = f" (+{len(row.spans) - 1})" if len(row.spans) > 1 else ""
+        text = f"{with_half(span.value, span.half95, row.unit)} {when(answer, span)}{more}"
+        wrong = Mark("warn", typeset(text))
+    words = typeset(row.offset_words) if row.offset_cause else ""
+    cause = f"{row.offset_cause}: {words}" if words and not words.startswith(row.offset_cause) else words
+    return _capital(row.quantity), constant, cause, _with(row.rms, row.unit), _with(row.sigma_rms, row.unit), wrong
+
+
+def _outages(answer: BestTrajectory) -> Grid | None:
+    if not answer.outages:
+        return None
+    heads = (
+        *(Head("Without GNSS, s", True), Head("Outages", True), Head("Smoothed, largest inside, RMS", True)),
+        *(Head("Forward filter at the end, RMS", True), Head("Inside 95 %", True), Head("RMS error / σ", True)),
+        Head("Replayed, s", True),
+    )
+    rows = [
+        (
+            number(one.length_s, 0),
+            number(one.count, 0),
+            _with(one.smoothed_rms_m, "m"),
+            _with(one.forward_end_rms_m, "m"),
+            percent(one.inside95_share),
+            number(one.rms_over_sigma, 2),
+            number(one.seconds, 0),
+        )
+        for one in answer.outages
+    ]
+    caption = f"GNSS is withheld from this log; truth is the {answer.outage_truth}. Horizontal."
+    if answer.outage_truth == "undisturbed solution":
+        caption += " It is the same solution with GNSS: what GNSS itself has wrong is in both."
+    return Grid("Outages of GNSS, replayed", heads, rows, caption, ("trajectory_outages",))
+
+
+def _checks(answer: BestTrajectory) -> Grid | None:
+    rows: list[tuple[Cell, ...]] = [*map(_innovation, answer.innovations), *map(_held_out, answer.held_out)]
+    if answer.own_track is not None:
+        own = answer.own_track
+        scatter = "" if own.scatter_100_s_deg is None else f"; medians of 100 s {number(own.scatter_100_s_deg, 2, '°')}"
+        found = f"MAD {number(own.mad_deg, 2, '°')}{scatter}"
+        rows.append(("Heading minus own track, straights", found, ABSENT, number(own.samples, 0), ABSENT))
+    heads = (Head("Check"), Head("Found", True), Head("Expected", True), Head("n", True), Head("State"))
+    caption = "Held out: every tenth run of GNSS, kept from the solution. Innovations: mean square over expected."
+    return Grid("Checks on the log itself", heads, rows, caption, ("trajectory_residuals",)) if rows else None
+
+
+def _innovation(row: InnovationRow) -> tuple[Cell, ...]:
+    mark = Mark("good", "inside") if row.is_inside else Mark("warn", "outside")
+    expected = f"1 ({row.low:g} … {row.high:g})"
+    return f"Innovations, {row.sensor}", number(row.ratio, 2), expected, number(row.count, 0), mark
+
+
+def _held_out(row: HeldOutRow) -> tuple[Cell, ...]:
+    share = f"{percent(row.inside95_share)} inside 95 %"
+    found = f"RMS {_with(row.error_rms, row.unit)}"
+    return f"GNSS held out, {row.quantity}", found, _with(row.sigma_rms, row.unit), number(row.count, 0), share
+
+
+def _parameters(answer: BestTrajectory) -> Grid | None:
+    if not answer.parameters:
+        return None
+    heads = (
+        *(Head("Parameter"), Head("Value, ± 95 %", True), Head("σ at first", True)),
+        Head("Observable"),
+    )
+    caption = "Values at the end of the log, in the axes of the body. What is not observable is as it was assumed."
+    return Grid("Parameters found", heads, [_parameter(one) for one in answer.parameters], caption)
+
+
+def _parameter(row: TrajectoryParameter) -> tuple[Cell, ...]:
+    mark = Mark("good", "yes") if row.is_observable else Mark("unknown", "no")
+    value = _signed(row.value, 1.96 * row.sigma, row.unit)
+    return _capital(row.name), value, _with(row.start_sigma, row.unit), mark
+
+
+def _noise(answer: BestTrajectory) -> Grid | None:
+    if not answer.noise:
+        return None
+    heads = (Head("Noise"), Head("Of its class", True), Head("Fitted", True), Head("Bound"))
+    rows: list[tuple[Cell, ...]] = [
+        (
+            _capital(one.name),
+            _with(one.prior, one.unit, 3),
+            _with(one.fitted, one.unit, 3),
+            Mark("warn", "at its bound") if one.is_at_bound else "",
+        )
+        for one in answer.noise
+    ]
+    return Grid("Noise of the model", heads, rows, "Fitted to this log by likelihood, within the bounds of the class.")
+
+
+def _raised(answer: BestTrajectory) -> Grid | None:
+    if not answer.raised:
+        return None
+    heads = (Head("Sigma"), Head("Raised by", True), Head("Why"))
+    rows = [(_capital(one.name), number(one.factor, 2), typeset(one.reason)) for one in answer.raised]
+    return Grid("Sigmas raised", heads, rows, "They are never lowered.")
+
+
+def _separation(answer: BestTrajectory) -> Grid | None:
+    if not answer.separation:
+        return None
+    heads = (Head("Quantity"), Head("RMS", True), Head("Worst", True), Head("At", True))
+    rows = [
+        (_capital(one.quantity), _with(one.rms, one.unit), _with(one.worst, one.unit), clock(one.worst_s))
+        for one in answer.separation
+    ]
+    return Grid("Forward filter against smoothed solution", heads, rows, "", ("trajectory_separation",))
+
+
+def _basis(answer: BestTrajectory) -> Facts:
+    kind = "increments" if answer.is_integral else "point samples"
+    gaps = len(answer.segments) - 1
+    pairs = [
+        ("Inertial unit", answer.imu, f"{number(answer.imu_rate_hz, 0, 'Hz')}, {kind}"),
+        ("GNSS", answer.gnss, ""),
+        ("Vehicle", MOTIONS.get(answer.vehicle, "not known"), ""),
+        ("Length", clock(answer.length_s), f"{number(len(answer.segments), 0)} segments" if gaps else "one segment"),
+        ("In motion", clock(answer.moving_s), ""),
+        ("Mounting", _mounting(answer.mounting), SOURCES[answer.mounting.source]),
+    ]
+    return Facts("What it rests on", pairs)
+
+
+def _mounting(mounting: UnitMounting) -> str:
+    if mounting.source == "case":
+        return f"attitude is that of the case{': ' * bool(mounting.words)}{typeset(mounting.words)}"
+    angles = ", ".join(
+        f"{name} {number(value, 1, '°')}"
+        for name, value in (("roll", mounting.roll_deg), ("pitch", mounting.pitch_deg), ("yaw", mounting.yaw_deg))
+    )
+    sigma = "" if mounting.sigma_deg is None else f" (σ {number(mounting.sigma_deg, 1, '°')})"
+    return f"{angles}{sigma}{'; ' * bool(mounting.words)}{typeset(mounting.words)}"
+
+
+# ---------------------------------------------------------------------------------------------------------- words
+
+
+def _with(value: float | None, unit: str, digits: int = 2) -> str:
+    return number_with_unit(significant(value, digits), unit_sign_of(unit))
+
+
+def _signed(value: float, half: float, unit: str) -> str:
+    places = places_of(half)
+    return number_with_unit(f"{number(value, places)} ± {number(half, places)}", unit_sign_of(unit))
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
