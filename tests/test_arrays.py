@@ -39,6 +39,7 @@ OPTIONAL = {
     },
     "forecast_growth": {"sigma_m"},
     "phases": {"proven"},
+    "trajectory_track": {"other_heading_deg"},
 }
 BY_TEXT = {"numbers", "flags", "texts", "figure_with_rows"}
 # Arrays of anybody's analysis; the fleet's table of flights, whose columns the analyses list; UTC beside any figure.

@@ -1,4 +1,4 @@
-"""Input of the trajectory estimator: increments of one inertial unit, fixes of one GNSS receiver."""
+"""Input of the trajectory estimator: increments of an inertial unit, fixes of a receiver."""
 
 from dataclasses import dataclass, fields
 

@@ -1,0 +1,144 @@
+"""Numbers of the model: noise of the unit by class, errors of GNSS, sigmas of the constants at the start."""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from groundstation.systems.trajectory.observations import Observations
+from groundstation.systems.trajectory.states import (
+    BA,
+    BARO,
+    BG,
+    FAST,
+    LAG,
+    LAT,
+    LEV,
+    MG,
+    MNT,
+    NO_SLIP,
+    POSITION,
+    SG,
+    SLOW,
+    STATES,
+    VELOCITY,
+    FloatArray,
+    Gate,
+    Noise,
+)
+
+DEG, STANDARD_GRAVITY_MPS2 = np.pi / 180.0, 9.80665
+HOUR = 3600.0
+
+
+@dataclass(frozen=True)
+class Model:
+    """Noise of the unit and errors of the aids; what the fit changes.
+
+    Parameters
+    ----------
+    gyro_noise_deg_rth, accel_noise_mps_rth : float
+        Angle and velocity random walk, deg and m/s in the square root of an hour.
+    gyro_walk_deg_rth3, accel_walk_mg_rth : float
+        Random walk of the biases: deg/s, and mg, in the square root of an hour.
+    rate_noise : float
+        Noise that grows with the rate: rad in the square root of (rad2/s).
+    position_scale, velocity_scale : float
+        White error of GNSS beside the sigma that the receiver states.
+    position_floor_m, velocity_floor_mps : float
+        White error however small the stated sigma.
+    slow_scale, fast_scale : float
+        Sigma of the slow and the fast error of GNSS position beside the stated sigma's median.
+    slow_s, fast_s : float
+        Their correlation times.
+    slip_mps : float
+        Sigma of the sideways and upward velocity of what rolls.
+    """
+
+    gyro_noise_deg_rth: float = 0.6
+    accel_noise_mps_rth: float = 0.12
+    gyro_walk_dps_rth: float = 0.05
+    accel_walk_mg_rth: float = 3.0
+    rate_noise: float = 0.0
+    position_scale: float = 0.5
+    velocity_scale: float = 1.0
+    position_floor_m: float = 0.005
+    velocity_floor_mps: float = 0.01
+    slow_scale: float = 1.0
+    fast_scale: float = 0.5
+    slow_s: float = 300.0
+    fast_s: float = 10.0
+    slip_mps: float = 0.1
+
+    def noise(self, sigma_m: FloatArray) -> Noise:
+        """Return the numbers as the loops take them; ``sigma_m`` (3,) is the median of the stated sigmas."""
+        root = np.sqrt(HOUR)
+        return Noise(
+            np.array(
+                [
+                    (self.gyro_noise_deg_rth * DEG / root) ** 2,
+                    (self.accel_noise_mps_rth / root) ** 2,
+                    (self.gyro_walk_dps_rth * DEG / root) ** 2,
+                    (self.accel_walk_mg_rth * 1e-3 * STANDARD_GRAVITY_MPS2 / root) ** 2,
+                    self.rate_noise**2,
+                ]
+            ),
+            np.array([self.slow_s, self.fast_s, 3600.0]),
+            np.concatenate([(self.slow_scale * sigma_m) ** 2, (self.fast_scale * sigma_m) ** 2, [25.0]]),
+        )
+
+    def weighted(self, seen: Observations) -> Observations:
+        """Return the observations with the variances of this model."""
+        variance = np.array(seen.variance)
+        for kind, scale, floor in (
+            (POSITION, self.position_scale, self.position_floor_m),
+            (VELOCITY, self.velocity_scale, self.velocity_floor_mps),
+            (NO_SLIP, self.slip_mps, 0.0),
+        ):
+            of = seen.kind == kind
+            variance[of] = variance[of] * scale**2 + floor**2
+        return replace(seen, variance=variance)
+
+    def changed(self, factors: dict[str, float]) -> "Model":
+        """Return the model with some numbers multiplied."""
+        return replace(self, **{name: getattr(self, name) * factor for name, factor in factors.items()})
+
+
+@dataclass(frozen=True)
+class StartSigmas:
+    """Sigmas of the constants at the start of a pass."""
+
+    gyro_bias_dps: float = 1.0
+    accel_bias_mg: float = 50.0
+    gyro_scale: float = 0.01
+    misalignment_deg: float = 0.5
+    lever_m: float = 1.0
+    latency_s: float = 0.2
+    lag_s: float = 0.1
+    mounting_deg: float = 5.0
+
+    def variances(self, noise: Noise, *, has_latency: bool, has_slip: bool, has_baro: bool) -> FloatArray:
+        """Return the variances of the states from BG on, shape (STATES,); those of navigation are zero."""
+        v = np.zeros(STATES)
+        v[BG : BG + 3] = (self.gyro_bias_dps * DEG) ** 2
+        v[BA : BA + 3] = (self.accel_bias_mg * 1e-3 * STANDARD_GRAVITY_MPS2) ** 2
+        v[SG : SG + 3] = self.gyro_scale**2
+        v[MG : MG + 6] = (self.misalignment_deg * DEG) ** 2
+        v[LEV : LEV + 3] = self.lever_m**2
+        v[LAT] = self.latency_s**2 if has_latency else 0.0
+        v[LAG] = self.lag_s**2 if has_latency else 0.0
+        v[SLOW:FAST] = noise.variance[:3]
+        v[FAST:MNT] = noise.variance[3:6]
+        v[MNT:BARO] = (self.mounting_deg * DEG) ** 2 if has_slip else 0.0
+        v[BARO] = noise.variance[6] if has_baro else 0.0
+        return v
+
+
+def gate(sigmas: float = 5.0) -> Gate:
+    """Return the rules of the gate."""
+    opened = np.concatenate([np.full(3, 5.0**2), np.full(3, 2.0**2), np.full(2, (3.0 * DEG) ** 2), [(10.0 * DEG) ** 2]])
+    return Gate(sigmas**2, 10, opened)
+
+
+def names_of(model: Model) -> tuple[str, ...]:
+    """Return the names of the numbers of a model."""
+    return tuple(item.name for item in fields(model))

@@ -1,0 +1,68 @@
+"""Observations of a pass in one list: GNSS, standstill, no slip, barometer."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.records import BoolArray, Int64Array, frozen
+from groundstation.systems.trajectory.inputs import GnssFixes
+from groundstation.systems.trajectory.states import POSITION, VELOCITY
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Measurements of up to three scalars each.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (m,)
+        Time by its stamp.
+    kind : ndarray of int, shape (m,)
+        See ``states``.
+    value, variance : ndarrays, shape (m, 3)
+        NaN: absent.
+    is_gnss : ndarray of bool, shape (m,)
+        True where the latency of GNSS shifts it.
+    """
+
+    time_s: FloatArray
+    kind: Int64Array
+    value: FloatArray
+    variance: FloatArray
+    is_gnss: BoolArray
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            object.__setattr__(self, item.name, frozen(getattr(self, item.name)))
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def take(self, index: Int64Array | BoolArray) -> "Observations":
+        """The measurements that ``index`` selects."""
+        return Observations(*(getattr(self, item.name)[index] for item in fields(self)))
+
+
+def joined(parts: list[Observations]) -> Observations:
+    """Return several lists as one."""
+    return Observations(
+        *(np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(Observations))
+    )
+
+
+def of_gnss(gnss: GnssFixes) -> Observations:
+    """Return positions and velocities with the variances that the receiver states."""
+    position = np.stack([np.radians(gnss.latitude_deg), np.radians(gnss.longitude_deg), gnss.height_m], axis=1)
+    kinds = np.repeat([POSITION, VELOCITY], len(gnss))
+    everywhere = np.ones(2 * len(gnss), dtype=bool)
+    found = Observations(
+        np.tile(gnss.time_s, 2),
+        kinds.astype(np.int64),
+        np.concatenate([position, gnss.velocity_mps]),
+        np.concatenate([gnss.position_sigma_m**2, gnss.velocity_sigma_mps**2]),
+        everywhere,
+    )
+    return found.take(np.isfinite(found.value).any(axis=1))

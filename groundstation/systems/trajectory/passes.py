@@ -1,0 +1,294 @@
+"""A pass over a log: filter forward, smoother back, states at the times of the samples."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.base.geodesy import curvature_radii_m
+from groundstation.base.records import Int64Array
+from groundstation.systems.trajectory.backward import run_backward
+from groundstation.systems.trajectory.forward import BLOCK, run_forward
+from groundstation.systems.trajectory.inputs import ImuIncrements
+from groundstation.systems.trajectory.observations import Observations
+from groundstation.systems.trajectory.states import (
+    KEPT_ROWS,
+    KINDS,
+    NAVIGATION,
+    STATES,
+    VELOCITY,
+    WIDTH,
+    FloatArray,
+    Gate,
+    Imu,
+    Kept,
+    Noise,
+    Now,
+    Room,
+    Schedule,
+    Seen,
+    transition_pattern,
+)
+
+LONGEST_EPOCH_S = 0.2  # the transition is linear over it
+GAP_SHARE = 0.5  # of an interval: a sample that begins so much later than the last ended has a gap before it
+ENTRIES = BLOCK + 7
+MEAN_S = 0.2  # vibration is averaged away, manoeuvres are not
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Increments as the loops take them, gaps filled by made samples.
+
+    ``time_s`` is the end of each; the first begins at ``begin_s``. ``is_made`` marks those that fill a gap.
+    """
+
+    time_s: FloatArray
+    imu: Imu
+    begin_s: float
+    is_made: FloatArray
+
+
+def fill_gaps(imu: ImuIncrements) -> Samples:
+    """Return the increments with a made sample in each gap: the mean of its neighbours, opened by their spread."""
+    missing = np.diff(imu.time_s) - imu.interval_s[1:]
+    at = np.flatnonzero(missing > GAP_SHARE * imu.interval_s[1:]) + 1
+    gap_s = missing[at - 1]
+    rate, force = (one / imu.interval_s[:, None] for one in (imu.delta_angle_rad, imu.delta_velocity_mps))
+    spread = [float(np.sqrt(np.mean((one - np.median(one, axis=0)) ** 2))) for one in (rate, force)]
+    made = [0.5 * (one[at - 1] + one[at]) * gap_s[:, None] for one in (rate, force)]
+    zero = np.zeros(len(imu))
+
+    def joined(values: FloatArray, filled: FloatArray) -> FloatArray:
+        return np.ascontiguousarray(np.insert(values, at, filled, axis=0))
+
+    loops = Imu(
+        joined(imu.interval_s, gap_s),
+        joined(imu.delta_angle_rad, made[0]),
+        joined(imu.delta_velocity_mps, made[1]),
+        joined(zero, (spread[0] * gap_s) ** 2),
+        joined(zero, (spread[1] * gap_s) ** 2),
+    )
+    time_s = joined(imu.time_s, imu.time_s[at] - imu.interval_s[at])
+    return Samples(time_s, loops, float(imu.time_s[0] - imu.interval_s[0]), joined(zero, np.ones(len(at))))
+
+
+def means_about(samples: Samples, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return angular rate and specific force about each time, means over ``MEAN_S``, shapes (m, 3)."""
+    ends = np.concatenate([[samples.begin_s], samples.time_s])
+    lowest, highest = time_s - 0.5 * MEAN_S, time_s + 0.5 * MEAN_S
+    at = [np.clip(np.searchsorted(ends, edge), 0, len(ends) - 1) for edge in (lowest, highest)]
+    at[0] = np.minimum(at[0], len(ends) - 2)
+    at[1] = np.maximum(at[1], at[0] + 1)
+    length_s = np.concatenate([[0.0], np.cumsum(samples.imu.interval_s)])
+    span_s = (length_s[at[1]] - length_s[at[0]])[:, None]
+    found = []
+    for values in (samples.imu.angle, samples.imu.velocity):
+        total = np.concatenate([np.zeros((1, 3)), np.cumsum(values, axis=0)])
+        found.append(np.ascontiguousarray((total[at[1]] - total[at[0]]) / span_s))
+    return found[0], found[1]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Epochs of a pass, and its measurements in their order; epoch 0 has no samples: it is the start."""
+
+    schedule: Schedule
+    seen: Seen
+    order: Int64Array  # of the observations, as the pass uses them
+    epoch_s: FloatArray
+
+
+def lay_out(samples: Samples, seen_at: Observations, begin_s: float, latency_s: float, lag_s: float = 0.0) -> Plan:
+    """Lay out the epochs from ``begin_s`` on; GNSS is shifted by its latency, its velocities by their lag as well."""
+    first_sample = int(np.searchsorted(samples.time_s, begin_s, side="right"))
+    start_s = samples.time_s[first_sample - 1] if first_sample else samples.begin_s
+    late_s = latency_s + np.where(seen_at.kind == VELOCITY, lag_s, 0.0)
+    valid_s = seen_at.time_s - np.where(seen_at.is_gnss, late_s, 0.0)
+    inside = (valid_s >= start_s) & (valid_s <= samples.time_s[-1])
+    order = np.flatnonzero(inside)[np.argsort(valid_s[inside], kind="stable")]
+    sample = np.searchsorted(samples.time_s[first_sample:], valid_s[order], side="left") + first_sample
+    count = len(samples.time_s)
+    grid = np.arange(samples.time_s[first_sample], samples.time_s[-1], LONGEST_EPOCH_S)
+    regular = np.searchsorted(samples.time_s, grid, side="left")
+    ends = np.unique(np.concatenate([sample + 1, regular + 1, [count]]))
+    ends = ends[ends > first_sample]
+    at_start = valid_s[order] <= start_s
+    epoch = np.where(at_start, 0, np.searchsorted(ends, sample + 1) + 1)
+    first = np.concatenate([[first_sample, first_sample], ends])
+    epoch_s = np.concatenate([[start_s], samples.time_s[ends - 1]])
+    seen = np.searchsorted(epoch, np.arange(len(epoch_s) + 1))
+    back_s = epoch_s[epoch] - valid_s[order]
+    return Plan(
+        Schedule(first.astype(np.int64), seen.astype(np.int64)),
+        Seen(
+            np.ascontiguousarray(seen_at.kind[order]),
+            np.ascontiguousarray(back_s),
+            np.ascontiguousarray(seen_at.value[order]),
+            np.ascontiguousarray(seen_at.variance[order]),
+            *means_about(samples, valid_s[order]),
+        ),
+        order,
+        epoch_s,
+    )
+
+
+@dataclass(frozen=True)
+class Start:
+    """Start of a pass: estimate, its covariance, and where the prior lies from it.
+
+    ``prior`` (STATES,) is the prior mean minus the estimate.
+    """
+
+    nav: FloatArray
+    value: FloatArray
+    p: FloatArray
+    prior: FloatArray
+
+    def now(self) -> Now:
+        """A copy that a pass may change."""
+        return Now(self.nav.copy(), self.value.copy(), self.p.copy(), np.zeros(7), np.zeros(KINDS, dtype=np.int64))
+
+
+def make_room(prior: FloatArray | None = None) -> Room:
+    """Return working arrays; ``prior`` is where the prior lies from the start."""
+    x = np.zeros((1, STATES))
+    if prior is not None:
+        x[0] = prior
+    return Room(
+        np.arange(STATES),
+        np.zeros((3, 3)),
+        np.zeros((9, 24)),
+        np.zeros((1, ENTRIES)),
+        np.zeros((STATES, STATES)),
+        np.zeros(STATES),
+        np.zeros(STATES),
+        x,
+        np.zeros((3, WIDTH), dtype=np.int64),
+        np.zeros((3, WIDTH)),
+        np.zeros(3),
+        np.zeros(28),
+    )
+
+
+def nothing_kept() -> Kept:
+    """Return a history of no length."""
+    wide = np.zeros((0, STATES))
+    return Kept(
+        np.zeros((0, 10)),
+        np.zeros((0, ENTRIES)),
+        np.zeros((0, KEPT_ROWS, STATES)),
+        wide,
+        wide,
+        wide,
+        np.zeros((0, WIDTH), dtype=np.int64),
+        np.zeros((0, WIDTH)),
+        wide,
+        np.zeros(0),
+        np.zeros(0),
+        np.zeros(0, dtype=np.int8),
+    )
+
+
+def all_kept(samples: int, epochs: int, seen: int) -> Kept:
+    """Return room for the history of a pass that is smoothed."""
+    scalars = 3 * seen
+    return Kept(
+        np.empty((samples, 10)),
+        np.empty((epochs, ENTRIES)),
+        np.empty((epochs, KEPT_ROWS, STATES)),
+        *(np.empty((epochs, STATES)) for _ in range(3)),
+        np.zeros((scalars, WIDTH), dtype=np.int64),
+        np.zeros((scalars, WIDTH)),
+        np.zeros((scalars, STATES)),
+        np.zeros(scalars),
+        np.ones(scalars),
+        np.zeros(scalars, dtype=np.int8),
+    )
+
+
+NOTHING_HELD = np.zeros(0, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Pass:
+    """A pass forward and back.
+
+    Parameters
+    ----------
+    x, variance : ndarrays, shape (e, KEPT_ROWS)
+        Smoothed correction to the estimate before the measurements of each epoch, and its variance.
+    start : Start
+        Start that the data say: estimate smoothed, covariance and prior those of the pass.
+    """
+
+    plan: Plan
+    kept: Kept
+    end: Now
+    likelihood: float
+    x: FloatArray
+    variance: FloatArray
+    start: Start
+
+
+PATTERN = transition_pattern()
+
+
+def run_pass(samples: Samples, plan: Plan, noise: Noise, gate: Gate, start: Start) -> Pass:
+    """Filter forward over all epochs and smooth back."""
+    epochs = len(plan.epoch_s)
+    kept = all_kept(len(samples.time_s), epochs, len(plan.seen.kind))
+    now, room = start.now(), make_room(start.prior)
+    likelihood = run_forward(
+        samples.imu, plan.schedule, plan.seen, noise, gate, PATTERN, NOTHING_HELD, 0, epochs, now, room, kept
+    )
+    x, variance = np.zeros((epochs, KEPT_ROWS)), np.zeros((epochs, KEPT_ROWS))
+    first = np.zeros(STATES)
+    run_backward(
+        plan.schedule,
+        PATTERN,
+        kept,
+        0,
+        epochs,
+        np.zeros(STATES),
+        np.zeros((STATES, STATES)),
+        np.zeros((STATES, STATES)),
+        np.zeros(STATES),
+        x,
+        variance,
+        first,
+        start.p,
+    )
+    x[0] += start.prior[:KEPT_ROWS]
+    return Pass(plan, kept, now, likelihood, x, variance, moved(start, first + start.prior))
+
+
+def moved(start: Start, correction: FloatArray) -> Start:
+    """Return a start with its estimate corrected; the prior stays where it is."""
+    nav = start.nav.copy()
+    north, east = (float(one) for one in curvature_radii_m(np.degrees(nav[0])))
+    nav[0] += correction[0] / (north + nav[2])
+    nav[1] += correction[1] / ((east + nav[2]) * np.cos(nav[0]))
+    nav[2] -= correction[2]
+    nav[3:6] += correction[3:6]
+    nav[6:] = turned(nav[None, 6:], correction[None, 6:9])[0]
+    value, prior = start.value.copy(), start.prior.copy()
+    value[NAVIGATION:] += correction[NAVIGATION:]
+    prior[NAVIGATION:] -= correction[NAVIGATION:]
+    return Start(nav, value, start.p, prior)
+
+
+def turned(quaternion: FloatArray, vector: FloatArray) -> FloatArray:
+    """Turn quaternions n from b (wxyz), shape (n, 4), by rotation vectors in n, shape (n, 3), rad."""
+    angle = np.linalg.norm(vector, axis=1)
+    s = 0.5 * np.sinc(0.5 * angle / np.pi)
+    c, (x, y, z) = np.cos(0.5 * angle), (vector * s[:, None]).T
+    a, b, d, e = quaternion.T
+    return np.stack(
+        [
+            c * a - x * b - y * d - z * e,
+            c * b + x * a + y * e - z * d,
+            c * d - x * e + y * a + z * b,
+            c * e + x * d - y * b + z * a,
+        ],
+        axis=1,
+    )
