@@ -30,12 +30,34 @@ from pyins.measurements import NedVelocity, Position  # noqa: E402
 from pyins.strapdown import compute_increments_from_imu  # noqa: E402
 
 from groundstation.base.angles import wrap_180  # noqa: E402
+from groundstation.base.attitude import rotation_n_from_b  # noqa: E402
 from groundstation.base.geodesy import curvature_radii_m  # noqa: E402
 from groundstation.simulation.imu.families import Family  # noqa: E402
 from groundstation.simulation.imu.flight import ImuFlight, simulate_imu  # noqa: E402
 from groundstation.simulation.imu.imu_class import ImuClass, load_imu_class  # noqa: E402
 from groundstation.simulation.imu.settings import ImuSettings, ReceiverSettings  # noqa: E402
 from groundstation.simulation.imu.unit import STANDARD_GRAVITY_MPS2  # noqa: E402
+from groundstation.systems.trajectory.forward import run_forward  # noqa: E402
+from groundstation.systems.trajectory.inputs import GnssFixes, ImuIncrements  # noqa: E402
+from groundstation.systems.trajectory.model import Model, StartSigmas, gate  # noqa: E402
+from groundstation.systems.trajectory.observations import of_gnss  # noqa: E402
+from groundstation.systems.trajectory.passes import (  # noqa: E402
+    NOTHING_HELD,
+    PATTERN,
+    Pass,
+    Plan,
+    Samples,
+    Start,
+    fill_gaps,
+    lay_out,
+    make_room,
+    nothing_kept,
+    run_pass,
+)
+from groundstation.systems.trajectory.solution import TrackOfStates  # noqa: E402
+from groundstation.systems.trajectory.start import quaternion_of  # noqa: E402
+from groundstation.systems.trajectory.states import LEV, NAVIGATION, STATES, Gate, Noise  # noqa: E402
+from groundstation.systems.trajectory.track import forward_track, smoothed_track  # noqa: E402
 
 Array = NDArray[np.float64]
 DURATION_S = 300.0
@@ -313,6 +335,97 @@ def by_inslib(of: Given) -> Side:
     return Side(run, run)
 
 
+@dataclass(frozen=True)
+class OurPass:
+    """What our loops take."""
+
+    samples: Samples
+    plan: Plan
+    noise: Noise
+    rules: Gate
+    start: Start
+
+
+def prepared(of: Given) -> OurPass:
+    """Lay out our pass: constants that the peers do not estimate have no variance."""
+    flight, gnss = of.flight, of.flight.gnss
+    parts = flight.time_s[1:], flight.interval_s[1:], flight.delta_angle_rad[1:], flight.delta_velocity_mps[1:]
+    samples = fill_gaps(ImuIncrements(*parts))
+    position, velocity = np.full((2, len(gnss.time_s), 3), [[[POSITION_SIGMA_M]], [[VELOCITY_SIGMA_MPS]]])
+    fixes = GnssFixes(
+        gnss.validity_s,
+        gnss.latitude_deg,
+        gnss.longitude_deg,
+        gnss.height_m,
+        gnss.velocity_mps,
+        position,
+        velocity,
+        gnss.is_precise,
+    )
+    micro_g_of = 1e3 / STANDARD_GRAVITY_MPS2
+    model = Model(
+        gyro_noise_deg_rth=float(np.degrees(of.gyro_noise) * 60.0),
+        accel_noise_mps_rth=of.accelerometer_noise * 60.0,
+        gyro_walk_dps_rth=float(np.degrees(of.gyro_walk) * 60.0),
+        accel_walk_mg_rth=of.accelerometer_walk * 60.0 * micro_g_of,
+        position_scale=1.0,
+        position_floor_m=0.0,
+        velocity_floor_mps=0.0,
+        slow_scale=0.0,
+        fast_scale=0.0,
+    )
+    noise = model.noise(np.full(3, POSITION_SIGMA_M))
+    sigmas = StartSigmas(
+        gyro_bias_dps=float(np.degrees(of.gyro_bias)),
+        accel_bias_mg=of.accelerometer_bias * micro_g_of,
+        gyro_scale=of.scale,
+        misalignment_deg=float(np.degrees(of.misalignment)),
+        lever_m=0.0,
+    )
+    variances = sigmas.variances(noise, has_latency=False, has_slip=False, has_baro=False)
+    level, heading = np.radians([LEVEL_START_DEG, HEADING_START_DEG])
+    variances[:NAVIGATION] = np.square([*[POSITION_START_M] * 3, *[VELOCITY_START_MPS] * 3, level, level, heading])
+    value = np.zeros(STATES)
+    value[LEV : LEV + 3] = flight.lever_arm_m
+    quaternion = quaternion_of(rotation_n_from_b(of.start[None, 6:])[0])
+    nav = np.concatenate([np.radians(of.start[:2]), of.start[2:6], quaternion])
+    start = Start(nav, value, np.diag(variances), np.zeros(STATES))
+    plan = lay_out(samples, model.weighted(of_gnss(fixes)), float(flight.time_s[0]), 0.0)
+    return OurPass(samples, plan, noise, gate(), start)
+
+
+def _judged(of: Given, run: OurPass, track: Callable[[Samples, Pass, NDArray[np.int64]], TrackOfStates]) -> Found:
+    done = run_pass(run.samples, run.plan, run.noise, run.rules, run.start)
+    states = track(run.samples, done, judged_at(of) - 1)
+    return Found(
+        np.stack([states.latitude_deg, states.longitude_deg, states.height_m], axis=1),
+        states.velocity_mps,
+        np.stack([states.roll_deg, states.pitch_deg, states.heading_deg], axis=1),
+        np.concatenate([states.position_sigma_m, states.velocity_sigma_mps, states.attitude_sigma_deg], axis=1),
+    )
+
+
+def by_us(of: Given) -> Side:
+    """Return the run of our filter alone."""
+    run = prepared(of)
+
+    def filtered() -> float:
+        now, room, epochs = run.start.now(), make_room(run.start.prior), len(run.plan.epoch_s)
+        parts = run.samples.imu, run.plan.schedule, run.plan.seen, run.noise, run.rules, PATTERN, NOTHING_HELD
+        return run_forward(*parts, 0, epochs, now, room, nothing_kept())
+
+    return Side(filtered, lambda: _judged(of, run, forward_track))
+
+
+def by_us_smoothed(of: Given) -> Side:
+    """Return the run of our filter with its smoother."""
+    run = prepared(of)
+    return Side(
+        lambda: run_pass(run.samples, run.plan, run.noise, run.rules, run.start),
+        lambda: _judged(of, run, smoothed_track),
+    )
+
+
 def errors_of(of: Given, found: Found) -> Array:
     """Errors at the judged samples, shape (k, 9): m north, east, down; m/s; deg."""
     flight, at = of.flight, judged_at(of)
@@ -329,7 +442,12 @@ def errors_of(of: Given, found: Found) -> Array:
     )
 
 
-SIDES: dict[str, Callable[[Given], Side]] = {"pyins": by_pyins, "INSLIB": by_inslib}
+SIDES: dict[str, Callable[[Given], Side]] = {
+    "pyins": by_pyins,
+    "INSLIB": by_inslib,
+    "ours": by_us,
+    "smoothed": by_us_smoothed,
+}
 
 
 def seconds_of(do: Callable[[], object]) -> float:
