@@ -104,6 +104,7 @@ def run_backward(
     u: FloatArray,
     x: FloatArray,
     variance: FloatArray,
+    plane: FloatArray,
     first_x: FloatArray,
     first_p: FloatArray,
 ) -> None:
@@ -117,6 +118,8 @@ def run_backward(
         Room.
     x, variance : ndarrays, shapes (e, KEPT_ROWS), (e, KEPT_ROWS)
         Filled: smoothed correction to the estimate before the measurements of each epoch, and its variance.
+    plane : ndarray, shape (e,)
+        Filled: covariance of the smoothed position, north with east.
     first_x : ndarray, shape (n,)
         Filled: p a at the start with the covariance ``first_p`` of the start, negative: correction of the start.
     """
@@ -126,15 +129,18 @@ def run_backward(
                 if solved.mark[3 * m + i] == 1:
                     back_over_scalar(3 * m + i, linear, solved, a, A, u)
         for i in range(KEPT_ROWS):
-            total, spread = 0.0, 0.0
+            total, spread, beside = 0.0, 0.0, 0.0
             for j in range(STATES):
                 total += solved.p[e, i, j] * a[j]
                 s = 0.0
                 for r in range(STATES):
                     s += A[j, r] * solved.p[e, i, r]
                 spread += solved.p[e, i, j] * s
+                beside += solved.p[e, 0, j] * s
             x[e, i] = -total
             variance[e, i] = solved.p[e, i, i] - spread
+            if i == 1:
+                plane[e] = solved.p[e, 0, 1] - beside
         back_over_step(e, pattern, linear, a, A, w, u)
     for i in range(STATES):
         total = 0.0

@@ -319,16 +319,3 @@ def _at(problem: Problem, model: Model, rules: Gate, start: Start) -> tuple[Star
     """Run one pass at the latency that stands."""
     done = run_pass(problem.samples, problem.plan(model), problem.noise(model), rules, start)
     return done.start, done
-
-
-def masked(seen: Observations, windows: FloatArray, latency_s: float) -> Observations:
-    """Return the observations without GNSS and standstill inside windows of time, shape (w, 2).
-
-    What knows of the standstill by GNSS is not known without it.
-    """
-    from groundstation.systems.trajectory.states import NO_SLIP
-
-    valid_s = seen.time_s - np.where(seen.is_gnss, latency_s, 0.0)
-    at = np.searchsorted(windows[:, 0], valid_s, side="right") - 1
-    inside = (at >= 0) & (valid_s < windows[np.maximum(at, 0), 1]) & (seen.kind != NO_SLIP)
-    return seen.take(~inside)

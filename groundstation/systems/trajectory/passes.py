@@ -224,6 +224,8 @@ class Pass:
         Linearisation and history of the filter.
     x, variance : ndarrays, shape (e, KEPT_ROWS)
         Smoothed correction to the estimate before the measurements of each epoch, and its variance.
+    plane : ndarray, shape (e,)
+        Covariance of the smoothed position, north with east.
     constants, constants_variance : ndarrays, shape (STATES,)
         Values of the constants at the end; smoothed they are the same at all times.
     begun, start : Start
@@ -236,6 +238,7 @@ class Pass:
     likelihood: float
     x: FloatArray
     variance: FloatArray
+    plane: FloatArray
     constants: FloatArray
     constants_variance: FloatArray
     begun: Start
@@ -286,6 +289,7 @@ def run_pass(
         solved,
     )
     x, variance = np.zeros((epochs, KEPT_ROWS)), np.zeros((epochs, KEPT_ROWS))
+    plane = np.zeros(epochs)
     first, square = np.zeros(STATES), [np.zeros((STATES, STATES)) for _ in range(2)]
     run_backward(
         plan.schedule,
@@ -300,6 +304,7 @@ def run_pass(
         np.zeros(STATES),
         x,
         variance,
+        plane,
         first,
         start.p,
     )
@@ -307,7 +312,7 @@ def run_pass(
     constants = linear.value[-1] + solved.after[-1]
     begun = first + start.prior
     return Pass(
-        plan, linear, solved, likelihood, x, variance, constants, solved.variance[-1], start, moved(start, begun)
+        plan, linear, solved, likelihood, x, variance, plane, constants, solved.variance[-1], start, moved(start, begun)
     )
 
 

@@ -1,0 +1,152 @@
+"""Outages of GNSS that are replayed on a log's own data: errors against the undisturbed solution, with their sigmas."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from groundstation.base.records import BoolArray, Int64Array
+from groundstation.systems.trajectory.estimate import Estimate
+from groundstation.systems.trajectory.passes import Pass, Plan, run_pass
+from groundstation.systems.trajectory.states import (
+    ATT,
+    NAVIGATION,
+    NO_RATE,
+    POSITION,
+    STILL,
+    VEL,
+    VELOCITY,
+    FloatArray,
+)
+
+LENGTHS_S = (10.0, 30.0, 60.0, 120.0)
+ENOUGH = 10  # outages of a length
+MOST_RUNS = 4
+APART_S = 60.0  # GNSS between two outages of one run, and as long as an outage
+LEAD_S = 60.0  # of the log before the first
+TAIL_S = 20.0  # and behind the last
+MOVING_SHARE = 0.5
+CHI2_95_OF_2 = 5.991464547107979
+
+
+@dataclass(frozen=True)
+class Outages:
+    """Replayed outages, a row each.
+
+    Parameters
+    ----------
+    start_s, length_s : ndarrays, shape (n,)
+    error_m, sigma_m : ndarrays, shape (n,)
+        Largest horizontal error of the smoothed solution inside, and the root of the sum of both variances there.
+    ratio : ndarray, shape (n,)
+        That error over its sigma: root of the squared Mahalanobis distance over its 95 % bound; 1 is the bound.
+    forward_end_m : ndarray, shape (n,)
+        Horizontal error of the filter at the end.
+    velocity_ratio : ndarray, shape (n, 3)
+        Error of the velocity in the middle over its sigma; north, east, down.
+    attitude : ndarray, shape (n, 3)
+        Change of the attitude at the end, rad, about north, east, down.
+    attitude_variance : ndarray, shape (n, 3)
+        What is to be expected of it: the variance that leaving out the data added.
+    """
+
+    start_s: FloatArray
+    length_s: FloatArray
+    error_m: FloatArray
+    sigma_m: FloatArray
+    ratio: FloatArray
+    forward_end_m: FloatArray
+    velocity_ratio: FloatArray
+    attitude: FloatArray
+    attitude_variance: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.start_s)
+
+    def of_length(self, length_s: float) -> BoolArray:
+        """Tell which rows are of a length."""
+        return self.length_s == length_s
+
+
+def replay(estimate: Estimate, lengths_s: tuple[float, ...] = LENGTHS_S) -> Outages:
+    """Replay outages of each length; several lie in one run, apart from each other."""
+    rows: list[tuple[float, ...]] = []
+    for length_s in lengths_s:
+        rows += _of_length(estimate, length_s)
+    table = np.array(rows, dtype=np.float64).reshape(-1, 15)
+    return Outages(*(table[:, i] for i in range(6)), table[:, 6:9], table[:, 9:12], table[:, 12:15])
+
+
+def _of_length(estimate: Estimate, length_s: float) -> list[tuple[float, ...]]:
+    times = estimate.result.plan.epoch_s
+    period_s = length_s + max(APART_S, length_s)
+    first_s, last_s = times[0] + LEAD_S, times[-1] - TAIL_S
+    places = max(0.0, (last_s - first_s - length_s) / period_s)
+    runs = int(np.clip(np.ceil(ENOUGH / max(1.0, places)), 1, MOST_RUNS))
+    rows: list[tuple[float, ...]] = []
+    for run in range(runs):
+        starts = np.arange(first_s + run * period_s / runs, last_s - length_s, period_s)
+        windows = np.column_stack([starts, starts + length_s])
+        windows = windows[[_is_fit(estimate, start, end) for start, end in windows]] if len(windows) else windows
+        if len(windows):
+            done = without(estimate, windows)
+            rows += [_row(estimate.result, done, start, end) for start, end in windows]
+    return rows
+
+
+def _is_fit(estimate: Estimate, start_s: float, end_s: float) -> bool:
+    """Tell whether GNSS is there and the vehicle moves."""
+    plan = estimate.result.plan
+    valid_s = _valid_s(plan)
+    inside = (valid_s >= start_s) & (valid_s < end_s)
+    fixes = inside & (plan.seen.kind == POSITION)
+    still = inside & (plan.seen.kind == STILL)
+    return bool(fixes.sum() >= 2 and still.sum() < MOVING_SHARE * (end_s - start_s))
+
+
+def _valid_s(plan: Plan) -> FloatArray:
+    """Return the times of validity of the measurements of a plan."""
+    epoch = np.repeat(np.arange(len(plan.epoch_s)), np.diff(plan.schedule.seen))
+    return np.asarray(plan.epoch_s[epoch] - plan.seen.back_s)
+
+
+def hidden(plan: Plan, windows: FloatArray) -> BoolArray:
+    """Tell which measurements are not there in outages: GNSS, and the standstill that it showed."""
+    valid_s = _valid_s(plan)
+    at = np.searchsorted(windows[:, 0], valid_s, side="right") - 1
+    inside = (at >= 0) & (valid_s < windows[np.maximum(at, 0), 1])
+    return inside & np.isin(plan.seen.kind, (POSITION, VELOCITY, STILL, NO_RATE))
+
+
+def without(estimate: Estimate, windows: FloatArray) -> Pass:
+    """Solve again without GNSS in windows of time, shape (w, 2)."""
+    base = estimate.result
+    variance = base.plan.seen.variance.copy()
+    variance[hidden(base.plan, windows)] = np.nan
+    plan = replace(base.plan, seen=base.plan.seen._replace(variance=variance))
+    problem = estimate.problem
+    return run_pass(problem.samples, plan, problem.noise(estimate.model), estimate.gate, base.begun, known=base.linear)
+
+
+def _row(full: Pass, done: Pass, start_s: float, end_s: float) -> tuple[float, ...]:
+    times = full.plan.epoch_s
+    inside: Int64Array = np.flatnonzero((times >= start_s) & (times <= end_s))
+    error = done.x[inside, :NAVIGATION] - full.x[inside, :NAVIGATION]
+    size = np.hypot(error[:, 0], error[:, 1])
+    worst = int(np.argmax(size))
+    at, (n, e) = inside[worst], error[worst, :2]
+    a, b, c = done.variance[at, 0], done.variance[at, 1], done.plane[at]
+    squared = (b * n * n - 2.0 * c * n * e + a * e * e) / max(a * b - c * c, 1e-12)
+    middle, last = inside[len(inside) // 2], inside[-1]
+    moving = done.x[middle, VEL:ATT] - full.x[middle, VEL:ATT]
+    forward = done.solved.before[last, :2] - full.x[last, :2]
+    return (
+        start_s,
+        end_s - start_s,
+        float(size[worst]),
+        float(np.sqrt(max(a + b, 1e-12))),
+        float(np.sqrt(max(squared, 0.0) / CHI2_95_OF_2)),
+        float(np.hypot(*forward)),
+        *(moving / np.sqrt(np.maximum(done.variance[middle, VEL:ATT], 1e-12))).tolist(),
+        *(done.x[last, ATT:NAVIGATION] - full.x[last, ATT:NAVIGATION]).tolist(),
+        *np.maximum(done.variance[last, ATT:NAVIGATION] - full.variance[last, ATT:NAVIGATION], 0.0).tolist(),
+    )
