@@ -69,7 +69,7 @@ def carry(e: int, first: int, last: int, imu: Imu, noise: Noise, now: Now, room:
     spent[e, 3] = 0.0
     keeps = linear.nav.shape[0] > 0
     for k in range(first, last):
-        mechanise(imu.interval_s[k], imu.angle, imu.velocity, k, value, nav, now.before, room.C, step)
+        mechanise(imu.interval_s, imu.angle, imu.velocity, k, value, nav, now.before, room.C, step)
         grow_transition(room.C, step, room.grown)
         for i in range(3):
             turn[i] += step[12 + i]
