@@ -1,6 +1,5 @@
 """Estimate of a trajectory: start, latency, noise, slip, and the smoothed passes of one segment."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -233,8 +232,8 @@ def relinearised(problem: Problem, model: Model, rules: Gate, done: Pass, rounds
     A filter that is linearised about its own estimate thinks that it sees what it cannot: as the estimate moves, the
     combination of errors that no datum shows moves too.
 
-    Source: B. M. Bell, The iterated Kalman smoother as a Gauss-Newton method, SIAM J. Optimization 4, 1994; G. P. Huang,
-    A. I. Mourikis, S. I. Roumeliotis, Observability-based rules for consistent EKF SLAM, 2010.
+    Source: B. M. Bell, The iterated Kalman smoother as a Gauss-Newton method, SIAM J. Optimization 4, 1994;
+    G. P. Huang, A. I. Mourikis, S. I. Roumeliotis, Observability-based rules for consistent EKF SLAM, 2010.
     """
     plan, noise = problem.plan(model), problem.noise(model)
     for _ in range(rounds):
@@ -257,9 +256,6 @@ def fitted(problem: Problem, model: Model, rules: Gate, done: Pass, numbers: tup
     return fit_model(model, likelihood, numbers)
 
 
-Progress = Callable[[str], None]
-
-
 def estimate(
     imu: ImuIncrements,
     gnss: GnssFixes,
@@ -268,6 +264,8 @@ def estimate(
     may_stop: bool = True,
     prior: Model | None = None,
     fit: bool = True,
+    latency_s: float = 0.0,
+    lag_s: float = 0.0,
 ) -> Estimate:
     """Estimate the trajectory of one segment.
 
@@ -282,9 +280,11 @@ def estimate(
         Numbers of the class.
     fit : bool
         False: the numbers of ``prior`` as they are.
+    latency_s, lag_s : float
+        Where the search for the latencies begins.
     """
     model = Model() if prior is None else prior
-    problem = pose(imu, gnss, may_stop=may_stop)
+    problem = replace(pose(imu, gnss, may_stop=may_stop), latency_s=latency_s, lag_s=lag_s)
     open_gate, rules = gate(OPEN_SIGMAS), gate(CLOSED_SIGMAS)
     first = hypotheses_of(problem, model, open_gate)
     problem, start, done = settle(problem, model, open_gate, first[0].start, LATENCY_ROUNDS)

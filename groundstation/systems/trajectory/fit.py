@@ -1,7 +1,9 @@
 """Fit of the model's numbers to a log: penalised likelihood, one number after the other.
 
-The likelihood is that of the filter's innovations (Schweppe 1965); each number has a prior about that of its class, wide
-in the logarithm, and bounds. Source: F. C. Schweppe, Evaluation of likelihood functions for Gaussian signals, IEEE
+The likelihood is that of the filter's innovations; each number has a prior about that of its class, wide in the
+logarithm, and bounds.
+
+Source: F. C. Schweppe, Evaluation of likelihood functions for Gaussian signals, IEEE
 Trans. Information Theory 11, 1965; R. K. Mehra, On the identification of variances and adaptive Kalman filtering, IEEE
 Trans. Automatic Control 15, 1970.
 """
@@ -31,8 +33,8 @@ NUMBERS = (
     Number("position_scale", 1.0, 0.02, 20.0),
     Number("slow_scale", 1.0, 0.05, 10.0),
     Number("fast_scale", 1.0, 0.02, 10.0),
-    Number("gyro_imperfection", 1.0, 0.03, 10.0),
-    Number("accel_imperfection", 1.0, 0.03, 10.0),
+    Number("gyro_imperfection", 0.7, 0.03, 4.0),
+    Number("accel_imperfection", 0.7, 0.03, 4.0),
     Number("jitter_s", 1.0, 0.1, 30.0),
     Number("gyro_walk_dps_rth", 1.0, 0.02, 30.0),
     Number("accel_walk_mg_rth", 1.0, 0.02, 30.0),
