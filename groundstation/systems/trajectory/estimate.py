@@ -6,6 +6,7 @@ import numpy as np
 
 from groundstation.systems.trajectory import observations, slip, still
 from groundstation.systems.trajectory.fit import NUMBERS, Fit, Number, fit_model
+from groundstation.systems.trajectory.fix_motion import motion_of
 from groundstation.systems.trajectory.forward import run_forward
 from groundstation.systems.trajectory.inputs import GnssFixes, ImuIncrements
 from groundstation.systems.trajectory.model import Model, StartSigmas, gate
@@ -129,7 +130,7 @@ class Estimate:
 def pose(imu: ImuIncrements, gnss: GnssFixes, *, may_stop: bool) -> Problem:
     """Return the problem of a segment at latency zero."""
     samples = fill_gaps(imu)
-    have = np.isfinite(gnss.latitude_deg) & np.isfinite(gnss.velocity_mps[:, :2]).all(axis=1)
+    have = np.isfinite(gnss.latitude_deg) & np.isfinite(motion_of(gnss)[:, :2]).all(axis=1)
     inside = have & (gnss.time_s >= samples.begin_s) & (gnss.time_s < samples.time_s[-1])
     begin_s = float(gnss.time_s[inside][0])
     middle, stands, rate = still.still_windows(samples, gnss, 0.0, may_stop=may_stop)
@@ -201,7 +202,7 @@ def heading_of(nav: FloatArray) -> float:
 
 
 def _first_motion_s(gnss: GnssFixes, begin_s: float) -> float:
-    speed = np.linalg.norm(np.nan_to_num(gnss.velocity_mps[:, :2]), axis=1)
+    speed = np.linalg.norm(np.nan_to_num(motion_of(gnss)[:, :2]), axis=1)
     moving = gnss.time_s[(speed > MOVES_MPS) & (gnss.time_s >= begin_s)]
     return float(moving[0]) if len(moving) else begin_s
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.records import BoolArray, Int64Array, frozen
+from groundstation.systems.trajectory.fix_motion import motion_of
 from groundstation.systems.trajectory.inputs import GnssFixes
 from groundstation.systems.trajectory.states import POSITION, VELOCITY
 
@@ -59,7 +60,7 @@ def joined(parts: list[Observations]) -> Observations:
 def of_gnss(gnss: GnssFixes) -> Observations:
     """Return positions and velocities with the variances that the receiver states."""
     position = np.stack([np.radians(gnss.latitude_deg), np.radians(gnss.longitude_deg), gnss.height_m], axis=1)
-    velocity = np.nan_to_num(gnss.velocity_mps)
+    velocity = np.nan_to_num(motion_of(gnss))
     kinds = np.repeat([POSITION, VELOCITY], len(gnss))
     everywhere = np.ones(2 * len(gnss), dtype=bool)
     found = Observations(

@@ -6,6 +6,7 @@ import numpy as np
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.systems.trajectory.estimate import Estimate, estimate
+from groundstation.systems.trajectory.fix_motion import motion_of
 from groundstation.systems.trajectory.inputs import GnssFixes, ImuIncrements
 
 SUBJECT = "trajectory"
@@ -39,7 +40,7 @@ def split(imu: ImuIncrements, gap_s: float) -> list[ImuIncrements]:
 
 def moving_s(gnss: GnssFixes, start_s: float, end_s: float, moving_mps: float) -> float:
     """Return the seconds in which GNSS moves, between two times."""
-    speed = np.linalg.norm(gnss.velocity_mps[:, :2], axis=1)
+    speed = np.linalg.norm(motion_of(gnss)[:, :2], axis=1)
     inside = (gnss.time_s >= start_s) & (gnss.time_s <= end_s)
     steps = np.minimum(np.diff(gnss.time_s, append=gnss.time_s[-1:]), 2.0)
     with np.errstate(invalid="ignore"):
@@ -53,8 +54,8 @@ def of_segment(gnss: GnssFixes, imu: ImuIncrements) -> GnssFixes:
 
 
 def is_usable(gnss: GnssFixes, imu: ImuIncrements) -> bool:
-    """Tell whether a segment has fixes with position and velocity inside."""
-    have = np.isfinite(gnss.latitude_deg) & np.isfinite(gnss.velocity_mps[:, :2]).all(axis=1)
+    """Tell whether a segment has fixes inside."""
+    have = np.isfinite(gnss.latitude_deg) & np.isfinite(motion_of(gnss)[:, :2]).all(axis=1)
     inside = (gnss.time_s > imu.time_s[0]) & (gnss.time_s < imu.time_s[-1] - 1.0)
     return int((have & inside).sum()) >= FEWEST_FIXES
 
@@ -84,7 +85,7 @@ def estimate_segments(
         longest = max((float(part.time_s[-1] - part.time_s[0]) for part, _ in parts), default=0.0)
         raise NotAssessableError(
             SUBJECT,
-            f"no stretch of {least_s:.0f} s with an inertial unit and GNSS position and velocity; the longest without a "
+            f"no stretch of {least_s:.0f} s with an inertial unit and GNSS; the longest without a "
             f"gap of the unit above {gap_s:g} s has {longest:.0f} s",
         )
     order = sorted(range(len(long)), key=lambda i: long[i][0].time_s[0] - long[i][0].time_s[-1])

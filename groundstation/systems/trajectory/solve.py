@@ -312,6 +312,6 @@ def _onboard(smoothed: TrackOfStates, flight: "Flight") -> ComparedFilter | None
 def _findings(gathered: Gathered, answer: BestTrajectory) -> tuple[Finding, ...]:
     """Return what the input showed."""
     return tuple(
-        Finding("warning" if note.is_doubt else "info", f"trajectory.{note.code}", note.text, gathered.imu_facts.topic)
+        Finding("warn" if note.is_doubt else "info", f"trajectory.{note.code}", note.text, gathered.imu_facts.topic)
         for note in gathered.notes
-    ) + tuple(Finding("warning", f"trajectory.{answer.state}", reason, answer.imu) for reason in answer.reasons[:1])
+    ) + tuple(Finding("warn", f"trajectory.{answer.state}", reason, answer.imu) for reason in answer.reasons[:1])
