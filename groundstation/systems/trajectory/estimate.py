@@ -37,6 +37,7 @@ from groundstation.systems.trajectory.states import (
     LAT,
     LEV,
     MNT,
+    NO_SLIP,
     SG,
     SLOW,
     FloatArray,
@@ -312,8 +313,13 @@ def estimate(
             model = found.model
             start, done = _at(problem, model, rules, problem.restarted(start, model))
     done = relinearised(problem, model, rules, done)
-    last = hypotheses_of(problem, model, rules)
+    last = hypotheses_of(_without_slip(problem), model, rules)
     return Estimate(problem, model, found, last, done, rules, travel)
+
+
+def _without_slip(problem: Problem) -> Problem:
+    """Return the problem without what was learned of the direction of travel: it would favour the heading it is of."""
+    return replace(problem, seen=problem.seen.take(problem.seen.kind != NO_SLIP), has_slip=False)
 
 
 def _at(problem: Problem, model: Model, rules: Gate, start: Start) -> tuple[Start, Pass]:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.systems.trajectory.model import Model
+from groundstation.systems.trajectory.states import FloatArray
 
 
 @dataclass(frozen=True)
@@ -65,15 +66,15 @@ def fit_model(prior: Model, likelihood: Callable[[Model], float], numbers: tuple
     logs = np.zeros(len(numbers))
     count = 0
 
-    def model_of(at: np.ndarray) -> Model:
+    def model_of(at: FloatArray) -> Model:
         return prior.changed({one.name: float(np.exp(step)) for one, step in zip(numbers, at, strict=True)})
 
-    def value_of(at: np.ndarray) -> float:
+    def value_of(at: FloatArray) -> float:
         nonlocal count
         count += 1
         penalty = sum(0.5 * (step / one.spread) ** 2 for one, step in zip(numbers, at, strict=True))
         found = likelihood(model_of(at))
-        return (found if np.isfinite(found) else -1e300) - penalty
+        return float((found if np.isfinite(found) else -1e300) - penalty)
 
     best = value_of(logs)
     steps = np.full(len(numbers), FIRST_STEP)
@@ -94,11 +95,11 @@ def fit_model(prior: Model, likelihood: Callable[[Model], float], numbers: tuple
 
 
 def _along(
-    value_of: Callable[[np.ndarray], float], logs: np.ndarray, i: int, step: float, low: float, high: float, best: float
-) -> tuple[float, np.ndarray, bool]:
+    value_of: Callable[[FloatArray], float], logs: FloatArray, i: int, step: float, low: float, high: float, best: float
+) -> tuple[float, FloatArray, bool]:
     """Walk along one number while it gets better, then to the top of the parabola through the last three."""
 
-    def at(number: float) -> np.ndarray:
+    def at(number: float) -> FloatArray:
         moved = logs.copy()
         moved[i] = min(max(number, low), high)
         return moved

@@ -129,7 +129,7 @@ def predict(e: int, noise: Noise, pattern: Pattern, now: Now, room: Room, linear
 @inlined
 def _is_absent(at: int, m: int, i: int, seen: Seen, linear: Linear) -> bool:
     z, variance = linear.z[at], seen.variance[m, i]
-    return z == NO_ROW or z != z or variance != variance
+    return bool(z == NO_ROW or z != z or variance != variance)
 
 
 @in_place

@@ -1,6 +1,7 @@
 """Observations of a pass in one list: GNSS, standstill, no slip, barometer."""
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +46,7 @@ class Observations:
     def __len__(self) -> int:
         return len(self.time_s)
 
-    def take(self, index: Int64Array | BoolArray) -> "Observations":
+    def take(self, index: Any) -> "Observations":
         """The measurements that ``index`` selects."""
         return Observations(*(getattr(self, item.name)[index] for item in fields(self)))
 

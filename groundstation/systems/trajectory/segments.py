@@ -85,8 +85,8 @@ def estimate_segments(
         longest = max((float(part.time_s[-1] - part.time_s[0]) for part, _ in parts), default=0.0)
         raise NotAssessableError(
             SUBJECT,
-            f"no stretch of {least_s:.0f} s with an inertial unit and GNSS; the longest without a "
-            f"gap of the unit above {gap_s:g} s has {longest:.0f} s",
+            f"no stretch of {least_s:.0f} s with an inertial unit and GNSS; the longest without a gap "
+            f"of the unit above {gap_s:g} s has {longest:.0f} s",
         )
     order = sorted(range(len(long)), key=lambda i: long[i][0].time_s[0] - long[i][0].time_s[-1])
     found: dict[int, Segment] = {}

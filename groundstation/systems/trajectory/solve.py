@@ -138,13 +138,13 @@ def _answered(
         joined([forward_track(one.problem.samples, one.result, segment=i) for i, one in enumerate(estimates)]), factors
     )
     sigma_deg *= factors.heading
-    if sigma_deg > settings.heading_sigma_max_deg:
+    hypotheses = _hypotheses(main)
+    if sigma_deg > settings.heading_sigma_max_deg and not _are_two(hypotheses, settings):
         raise NotAssessableError(
             SUBJECT,
-            f"heading to {sigma_deg:.1f} deg (sigma) alone, limit {settings.heading_sigma_max_deg:g}: the motion does not "
-            "show it",
+            f"heading to {sigma_deg:.1f} deg (sigma) alone, limit {settings.heading_sigma_max_deg:g}: the motion does "
+            "not show it",
         )
-    hypotheses = _hypotheses(main)
     gates = _gates(innovations, sigma_deg, factors, settings)
     state, reasons = _state(gathered, mounting, main, hypotheses, gates, outages, factors, settings)
     separation, separation_figure = figures.separation_of(forward, smoothed)
@@ -202,8 +202,8 @@ def _fits(innovations: tuple[InnovationRow, ...], main: Estimate, settings: Traj
         if row.ratio > settings.nis_max or not np.isfinite(row.ratio):
             raise NotAssessableError(
                 SUBJECT,
-                f"innovations of {row.sensor} are {row.ratio:.1f} times what is expected after the noise was fitted, limit "
-                f"{settings.nis_max:g}: unit and GNSS do not go together",
+                f"innovations of {row.sensor} are {row.ratio:.1f} times what is expected after the noise was fitted, "
+                f"limit {settings.nis_max:g}: unit and GNSS do not go together",
             )
     share = checks.used_share(main)
     if share < 0.5:
@@ -218,6 +218,11 @@ def _hypotheses(main: Estimate) -> tuple[HeadingHypothesis, ...]:
     )
 
 
+def _are_two(hypotheses: tuple[HeadingHypothesis, ...], settings: TrajectorySettings) -> bool:
+    """Tell whether a second heading explains the log nearly as well."""
+    return len(hypotheses) > 1 and hypotheses[1].below_best < settings.ambiguous_below
+
+
 def _other_heading(track: TrackOfStates, hypotheses: tuple[HeadingHypothesis, ...]) -> FloatArray:
     """Return the heading of the runner-up: the best one turned by the difference at the end."""
     turn = hypotheses[1].end_heading_deg - hypotheses[0].end_heading_deg
@@ -230,9 +235,13 @@ def _gates(
     """Return the checks that the state rests on."""
     gates = [
         judged_gate(
-            settings.nis_doubt, f"nis_{row.sensor.replace(' ', '_').lower()}", f"innovations of {row.sensor}", row.ratio
+            settings.nis_doubt,
+            f"nis_{row.sensor.replace(' ', '_').lower()}",
+            f"innovations of {row.sensor}, beside what is expected,",
+            row.ratio,
         )
         for row in innovations
+        if row.sensor.startswith("GNSS")
     ]
     gates.append(
         judged_gate(
@@ -277,11 +286,11 @@ def _state(
     reasons += [note.text for note in gathered.notes if note.is_doubt]
     if mounting.doubt:
         reasons.append(mounting.doubt)
-    if len(hypotheses) > 1 and hypotheses[1].below_best < settings.ambiguous_below:
+    if _are_two(hypotheses, settings):
         one, two = hypotheses[:2]
         first = (
-            f"a heading of {two.end_heading_deg:.0f} deg at the end is only {two.below_best:.1f} log units below the best "
-            f"one of {one.end_heading_deg:.0f} deg, limit {settings.ambiguous_below:g}"
+            f"a heading of {two.end_heading_deg:.0f} deg at the end is only {two.below_best:.1f} log units below the "
+            f"best one of {one.end_heading_deg:.0f} deg, limit {settings.ambiguous_below:g}"
         )
         return "ambiguous", (first, *reasons)
     return ("doubtful" if reasons else "accepted"), tuple(reasons)

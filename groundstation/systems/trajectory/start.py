@@ -28,7 +28,7 @@ def quaternion_of(C: FloatArray) -> FloatArray:
         q = np.array([(C[0, 2] - C[2, 0]) / 4 / y, (C[0, 1] + C[1, 0]) / 4 / y, y, (C[1, 2] + C[2, 1]) / 4 / y])
     else:
         q = np.array([(C[1, 0] - C[0, 1]) / 4 / z, (C[0, 2] + C[2, 0]) / 4 / z, (C[1, 2] + C[2, 1]) / 4 / z, z])
-    return q / np.linalg.norm(q)
+    return np.asarray(q / np.linalg.norm(q))
 
 
 def level(force: FloatArray, heading_rad: float, acceleration: FloatArray) -> FloatArray:
