@@ -50,11 +50,12 @@ from groundstation.systems.trajectory.track import angles_of, smoothed_track
 
 OPEN_SIGMAS, CLOSED_SIGMAS = 30.0, 5.0  # of the gate, before and after the noise is fitted
 LATENCY_ROUNDS, LATENCY_ENOUGH_S = 6, 0.003
+MOST_LATENCY_S = 2.0  # no receiver is later; beyond it a filter has lost its way
 SETTLE_ROUNDS, LINE_ROUNDS = 3, 2
 FIT_S = 600.0  # seconds behind the first motion that the noise is fitted to
 MOVES_MPS = 1.0
 SETTLED_RAD = 5e-4  # attitude of the start against the pass before
-SLIP = Number("slip_mps", 1.0, 0.3, 20.0)
+SLIP = (Number("slip_mps", 1.0, 0.1, 20.0), Number("slip_walk_deg_rts", 1.0, 0.1, 10.0))
 PRUNE_S, PRUNE_BELOW = 120.0, 60.0  # hypotheses so far below the best after so long are given up
 SAME_HEADING_DEG = 10.0
 
@@ -214,6 +215,7 @@ def settle(problem: Problem, model: Model, rules: Gate, start: Start, rounds: in
         plan = problem.plan(model)
         done = run_pass(problem.samples, plan, problem.noise(model), rules, start)
         late, lag = float(done.constants[LAT]), float(done.constants[LAG])
+        late = float(np.clip(problem.latency_s + late, -MOST_LATENCY_S, MOST_LATENCY_S)) - problem.latency_s
         start = done.start
         value, prior = start.value.copy(), start.prior.copy()
         for at, by in ((LAT, late), (LAG, lag)):
@@ -309,7 +311,7 @@ def estimate(
         start, done = _at(problem, model, rules, problem.restarted(start, model))
         if fit:
             done = relinearised(problem, model, rules, done)
-            found = fitted(problem, model, rules, done, (SLIP,))
+            found = fitted(problem, model, rules, done, SLIP)
             model = found.model
             start, done = _at(problem, model, rules, problem.restarted(start, model))
     done = relinearised(problem, model, rules, done)

@@ -31,6 +31,7 @@ NUMBERS = (
     Number("gyro_noise_deg_rth", 1.5, 0.02, 40.0),
     Number("accel_noise_mps_rth", 1.5, 0.02, 60.0),
     Number("velocity_scale", 1.0, 0.1, 20.0),
+    Number("velocity_down_scale", 0.7, 0.2, 5.0),
     Number("position_scale", 1.0, 0.02, 20.0),
     Number("slow_scale", 1.0, 0.05, 10.0),
     Number("fast_scale", 1.0, 0.02, 10.0),

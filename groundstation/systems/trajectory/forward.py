@@ -30,6 +30,7 @@ from groundstation.systems.trajectory.states import (
     BG,
     KEPT_ROWS,
     LEV,
+    MNT,
     NAVIGATION,
     SLOW,
     STATES,
@@ -120,6 +121,9 @@ def predict(e: int, noise: Noise, pattern: Pattern, now: Now, room: Room, linear
         p[6 + i, 6 + i] += density[0] * total + density[4] * spent[e, 1] + spent[e, 2]
         p[BG + i, BG + i] += density[2] * total
         p[BA + i, BA + i] += density[3] * total
+    for i in range(2):
+        if p[MNT + i, MNT + i] > 0.0:
+            p[MNT + i, MNT + i] += density[5] * total
     for i in range(6):
         at, decay = SLOW + i, F[e, BLOCK + i]
         p[at, at] += noise.variance[i] * (1.0 - decay * decay)

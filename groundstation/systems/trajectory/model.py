@@ -46,6 +46,8 @@ class Model:
         Noise that grows with the rate: rad in the square root of (rad2/s).
     position_scale, velocity_scale : float
         White error of GNSS beside the sigma that the receiver states.
+    velocity_down_scale : float
+        That of the vertical velocity beside the horizontal one.
     position_floor_m, velocity_floor_mps : float
         White error however small the stated sigma.
     slow_scale, fast_scale : float
@@ -56,6 +58,9 @@ class Model:
         Sigma of the sideways and upward velocity of what rolls.
     gyro_imperfection, accel_imperfection : float
         Sigmas of scale factors and misalignments beside those of :class:`StartSigmas`.
+    slip_walk_deg_rts : float
+        Random walk of the direction of travel in the unit, deg in the square root of a second: slip lasts for seconds
+        to minutes, in bends, on a crowned road, by the wind.
     jitter_s : float
         Sigma of the stamps of GNSS against those of the unit.
     """
@@ -67,6 +72,7 @@ class Model:
     rate_noise: float = 0.0
     position_scale: float = 0.5
     velocity_scale: float = 1.0
+    velocity_down_scale: float = 1.0
     position_floor_m: float = 0.005
     velocity_floor_mps: float = 0.01
     slow_scale: float = 1.0
@@ -74,6 +80,7 @@ class Model:
     slow_s: float = 300.0
     fast_s: float = 10.0
     slip_mps: float = 0.1
+    slip_walk_deg_rts: float = 0.05
     jitter_s: float = 0.003
     gyro_imperfection: float = 1.0
     accel_imperfection: float = 1.0
@@ -89,6 +96,7 @@ class Model:
                     (self.gyro_walk_dps_rth * DEG / root) ** 2,
                     (self.accel_walk_mg_rth * 1e-3 * STANDARD_GRAVITY_MPS2 / root) ** 2,
                     self.rate_noise**2,
+                    (self.slip_walk_deg_rts * DEG) ** 2,
                 ]
             ),
             np.array([self.slow_s, self.fast_s, 3600.0]),
@@ -105,6 +113,7 @@ class Model:
         ):
             of = seen.kind == kind
             variance[of] = variance[of] * scale**2 + floor**2 + (seen.change[of] * self.jitter_s) ** 2
+        variance[seen.kind == VELOCITY, 2] *= self.velocity_down_scale**2
         return replace(seen, variance=variance)
 
     def changed(self, factors: dict[str, float]) -> "Model":
@@ -121,7 +130,7 @@ class StartSigmas:
     gyro_scale: float = 0.005
     misalignment_deg: float = 0.3
     accel_scale: float = 0.005
-    accel_misalignment_deg: float = 0.3
+    accel_square_deg: float = 0.3
     lever_m: float = 1.0
     latency_s: float = 0.2
     lag_s: float = 0.1
@@ -135,7 +144,7 @@ class StartSigmas:
         v[SG : SG + 3] = (model.gyro_imperfection * self.gyro_scale) ** 2
         v[MG : MG + 6] = (model.gyro_imperfection * self.misalignment_deg * DEG) ** 2
         v[SA : SA + 3] = (model.accel_imperfection * self.accel_scale) ** 2
-        v[MA : MA + 6] = (model.accel_imperfection * self.accel_misalignment_deg * DEG) ** 2
+        v[MA : MA + 3] = (model.accel_imperfection * self.accel_square_deg * DEG) ** 2
         v[LEV : LEV + 3] = self.lever_m**2
         v[LAT] = self.latency_s**2 if has_latency else 0.0
         v[LAG] = self.lag_s**2 if has_latency else 0.0

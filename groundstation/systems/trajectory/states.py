@@ -12,7 +12,7 @@ ATT       3       attitude: rotation vector in north, east, down, ``C = exp(phi 
 BG, BA    3, 3    biases of gyro (rad/s) and accelerometer (m/s2) along the axes of the unit
 SG        3       scale factor of the gyro, no unit
 MG        6       misalignment of the gyro, rad: (x, y), (x, z), (y, x), (y, z), (z, x), (z, y) of (reads, turned)
-SA, MA    3, 6    scale factor and misalignment of the accelerometer, in the same order
+SA, MA    3, 3    scale factor of the accelerometer, and how far its axes are from square: (x, y), (x, z), (y, z)
 LEV       3       antenna from the unit, along its axes, m
 LAT       1       latency: GNSS valid so much earlier than stamped, beyond what the stamps are shifted by, s
 LAG       1       velocity of GNSS valid so much earlier than its position, beyond what the stamps are shifted by, s
@@ -21,6 +21,9 @@ FAST      3       fast error of GNSS position, north, east, down, m
 MNT       2       direction of travel of what rolls in the axes of the unit: yaw and pitch, rad
 BARO      1       offset of the barometric height, m
 ========  ======  =====================================================================================
+
+The attitude is that of the accelerometer's axes, made square: a rotation of both triads against the case is seen by
+nothing in the log. It is mounting, as the case is against the body.
 """
 
 from typing import NamedTuple
@@ -35,11 +38,12 @@ FloatArray = NDArray[np.float64]
 Marks = NDArray[np.int8]
 
 POS, VEL, ATT, BG, BA, SG, MG, SA, MA = 0, 3, 6, 9, 12, 15, 18, 24, 27
-LEV, LAT, LAG, SLOW, FAST, MNT, BARO = 33, 36, 37, 38, 41, 44, 46
-STATES = 47
+LEV, LAT, LAG, SLOW, FAST, MNT, BARO = 30, 33, 34, 35, 38, 41, 43
+STATES = 44
 NAVIGATION = 9  # the first states: position, velocity, attitude
 KEPT_ROWS = 15  # rows of the covariance that the smoother needs: navigation and biases
 MISALIGNED = ((0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1))  # axis that reads, axis that turned
+NOT_SQUARE = ((0, 1), (0, 2), (1, 2))
 
 # Kinds of measurements.
 POSITION, VELOCITY, STILL, NO_RATE, NO_SLIP, HEIGHT, HEADING = range(7)
@@ -95,7 +99,7 @@ class Seen(NamedTuple):
 class Noise(NamedTuple):
     """Numbers of the model: spectral densities of the unit's noise, and the Gauss-Markov processes."""
 
-    density: FloatArray  # (5,) gyro rad2/s, accelerometer m2/s3, bias of gyro rad2/s3, of accelerometer m2/s5, rate
+    density: FloatArray  # (6,) gyro rad2/s, accelerometer m2/s3, biases rad2/s3 and m2/s5, rate, slip angle rad2/s
     time_s: FloatArray  # (3,) correlation times: slow, fast, barometer
     variance: FloatArray  # (7,) stationary variances: slow and fast north, east, down, m2; barometer
 

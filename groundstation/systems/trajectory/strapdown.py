@@ -98,8 +98,8 @@ def mechanise(
     az = z - value[BG + 2] * dt - value[SG + 2] * z - value[MG + 4] * x - value[MG + 5] * y
     u, v, w = velocity[k, 0], velocity[k, 1], velocity[k, 2]
     ux = u - value[BA] * dt - value[SA] * u - value[MA] * v - value[MA + 1] * w
-    uy = v - value[BA + 1] * dt - value[SA + 1] * v - value[MA + 2] * u - value[MA + 3] * w
-    uz = w - value[BA + 2] * dt - value[SA + 2] * w - value[MA + 4] * u - value[MA + 5] * v
+    uy = v - value[BA + 1] * dt - value[SA + 1] * v - value[MA] * u - value[MA + 2] * w
+    uz = w - value[BA + 2] * dt - value[SA + 2] * w - value[MA + 1] * u - value[MA + 2] * v
     # the increments before, brought to this interval's length
     ratio = 0.0
     if before[6] > 0.5 * dt and before[6] < 2.0 * dt:
@@ -204,6 +204,17 @@ def _push_column(grown: FloatArray, j: int, n: float, e: float, d: float, dt: fl
 
 
 @inlined
+def _push_square(
+    grown: FloatArray, j: int, C: FloatArray, one: int, first: float, other: int, second: float, dt: float
+) -> None:
+    """Let two axes of the accelerometer that are not square act: each reads a share of what the other feels."""
+    n = C[0, one] * first + C[0, other] * second
+    e = C[1, one] * first + C[1, other] * second
+    d = C[2, one] * first + C[2, other] * second
+    _push_column(grown, j, -n, -e, -d, dt)
+
+
+@inlined
 def grow_transition(C: FloatArray, step: FloatArray, grown: FloatArray) -> None:
     """Let the transition of navigation grow by one sample.
 
@@ -226,12 +237,9 @@ def grow_transition(C: FloatArray, step: FloatArray, grown: FloatArray) -> None:
     _grow_column(grown, MG + 4, -C[0, 2] * a, -C[1, 2] * a, -C[2, 2] * a, step)
     _grow_column(grown, MG + 5, -C[0, 2] * b, -C[1, 2] * b, -C[2, 2] * b, step)
     a, b, c = step[16], step[17], step[18]
-    _push_column(grown, MA, -C[0, 0] * b, -C[1, 0] * b, -C[2, 0] * b, dt)
-    _push_column(grown, MA + 1, -C[0, 0] * c, -C[1, 0] * c, -C[2, 0] * c, dt)
-    _push_column(grown, MA + 2, -C[0, 1] * a, -C[1, 1] * a, -C[2, 1] * a, dt)
-    _push_column(grown, MA + 3, -C[0, 1] * c, -C[1, 1] * c, -C[2, 1] * c, dt)
-    _push_column(grown, MA + 4, -C[0, 2] * a, -C[1, 2] * a, -C[2, 2] * a, dt)
-    _push_column(grown, MA + 5, -C[0, 2] * b, -C[1, 2] * b, -C[2, 2] * b, dt)
+    _push_square(grown, MA, C, 0, b, 1, a, dt)
+    _push_square(grown, MA + 1, C, 0, c, 2, a, dt)
+    _push_square(grown, MA + 2, C, 1, c, 2, b, dt)
     # attitude: the specific force, once for velocity and twice for position
     for i in range(3):
         n, e, d = 0.0, 0.0, 0.0

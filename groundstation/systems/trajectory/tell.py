@@ -21,6 +21,7 @@ from groundstation.systems.trajectory.states import (
     MG,
     MISALIGNED,
     MNT,
+    NOT_SQUARE,
     POSITION,
     SA,
     SG,
@@ -41,15 +42,17 @@ NOISES = (
     ("slow_scale", "slow error of GNSS position (300 s), beside the stated sigma", ""),
     ("fast_scale", "fast error of GNSS position (10 s), beside the stated sigma", ""),
     ("velocity_scale", "error of GNSS velocity, beside the stated sigma", ""),
+    ("velocity_down_scale", "error of its vertical velocity, beside the horizontal one", ""),
     ("jitter_s", "jitter of the stamps of GNSS", "s"),
     ("slip_mps", "sideways motion of what rolls", "m/s"),
+    ("slip_walk_deg_rts", "walk of its direction of travel", "deg/sqrt(s)"),
 )
 
 
 def noise_rows(estimate: Estimate) -> tuple[NoiseRow, ...]:
     """Return the numbers of the model: prior, fitted, whether at a bound."""
     prior = Model()
-    names = [one for one in NOISES if one[0] != "slip_mps" or estimate.problem.has_slip]
+    names = [one for one in NOISES if not one[0].startswith("slip") or estimate.problem.has_slip]
     return tuple(
         NoiseRow(
             words,
@@ -84,8 +87,8 @@ def parameter_rows(estimate: Estimate) -> tuple[TrajectoryParameter, ...]:
         put(SA + i, f"accelerometer scale {axis}", "accelerometer scale", "%", 0.01)
     for i, (reads, turns) in enumerate(MISALIGNED):
         put(MG + i, f"gyro misalignment {axes[reads]}{axes[turns]}", "gyro misalignment", "deg", DEG)
-    for i, (reads, turns) in enumerate(MISALIGNED):
-        put(MA + i, f"accelerometer misalignment {axes[reads]}{axes[turns]}", "accelerometer misalignment", "deg", DEG)
+    for i, (one, other) in enumerate(NOT_SQUARE):
+        put(MA + i, f"accelerometer {axes[one]} to {axes[other]}, not square by", "accelerometer axes", "deg", DEG)
     for i, axis in enumerate(body):
         put(LEV + i, f"antenna {axis} of the unit", "lever arm", "m", 1.0)
     put(LAT, "GNSS latency", "latency", "s", 1.0, estimate.problem.latency_s)
