@@ -189,7 +189,7 @@ def test_jitter_beyond_a_step_with_lost_samples() -> None:
     keep = np.ones(len(time_s), dtype=bool)
     keep[[4000, 4001, 4002, 9000, 9001, 9002, 9003, 9004]] = False
     stamp_s = time_s + rng.normal(0.0, 0.003, len(time_s))
-    found = gathered(samples(time_s, stamp_s).take(np.argsort(np.argsort(stamp_s))), fixes())
+    found = gathered(samples(time_s, stamp_s), fixes())
     assert (np.diff(found.imu.time_s) > 0.0).all()
     lost = on_a_line(stamp_s[keep])
     assert lost.lost == 8 and lost.is_moved
@@ -197,6 +197,13 @@ def test_jitter_beyond_a_step_with_lost_samples() -> None:
     near = np.zeros(len(error_s), dtype=bool)  # the place of a loss is known to some samples only
     near[3950:4050], near[8940:9050] = True, True
     assert np.abs(error_s[~near]).max() < 0.0008
+
+
+def test_increments_stay_increments_under_jitter_beyond_a_step() -> None:
+    time_s = imu_times()
+    stamp_s = time_s + np.random.default_rng(8).normal(0.0, 0.012, len(time_s))
+    found = gathered(increments(time_s, stamp_s), fixes())
+    assert found.imu.is_integral and found.imu.interval_s == pytest.approx(STEP_S)
 
 
 def test_batches_that_share_a_stamp_are_spread() -> None:
@@ -265,6 +272,11 @@ def test_increments_of_a_part_of_the_time_are_samples() -> None:
     found = gathered(increments(time_s).take(slice(0, None, 4)), fixes())
     assert not found.imu.is_integral and "point_samples" in codes(found)
     assert found.imu.interval_s.sum() == pytest.approx(WHOLE_S, abs=0.1)
+
+
+def test_increments_that_overlap_are_refused() -> None:
+    time_s = imu_times()
+    assert "cover 200 % of the time" in refused(increments(time_s, interval_s=np.full(len(time_s), 0.02)), fixes())
 
 
 def test_samples_logged_twice_and_backward_stamps() -> None:
