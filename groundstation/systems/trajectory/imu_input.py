@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.errors import NotAssessableError
-from groundstation.base.records import BoolArray
+from groundstation.base.records import BoolArray, Column
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.base.words import clock_text, counted, listed
@@ -154,6 +154,8 @@ def _samples(flight: Flight, topic: str, settings: InputSettings, notes: list[In
     fields = _fields_of(table)
     if 2 * np.count_nonzero(table.valid(*fields)) < len(table) and not (np.diff(table.time_ns) > 0).all():
         table = table.unique_times()  # parts of a sample in several rows
+    if fields == SAMPLES:
+        table = _at_one_time(table, settings, notes)
     whole = table.valid(*fields)
     absent = int(len(table) - np.count_nonzero(whole))
     if absent:
@@ -173,6 +175,32 @@ def _samples(flight: Flight, topic: str, settings: InputSettings, notes: list[In
         values[:, :3] /= DEG_PER_RAD
         return _without_repeats(_Samples(time_s, values, None, clipped), topic, notes), False
     return _integrated(_Samples(time_s, values, None, clipped), table, settings, notes)
+
+
+def _at_one_time(table: Table, settings: InputSettings, notes: list[InputNote]) -> Table:
+    """Return a table whose rows have all six axes where rates and specific force are sampled apart.
+
+    The one with fewer samples is interpolated to the times of the other.
+    """
+    has_rate, has_force = table.valid(*RATES), table.valid(*ACCELERATIONS)
+    most = max(int(has_rate.sum()), int(has_force.sum()))
+    if 2 * np.count_nonzero(has_rate & has_force) >= most:
+        return table
+    base, other, fields, what = has_rate, has_force, ACCELERATIONS, "specific force"
+    if has_force.sum() > has_rate.sum():
+        base, other, fields, what = has_force, has_rate, RATES, "rates"
+    made, source = table.take(base), table.take(other)
+    start_ns = int(table.time_ns[0])
+    at_s, known_s = (made.time_ns - start_ns) / 1e9, (source.time_ns - start_ns) / 1e9
+    after = np.clip(np.searchsorted(known_s, at_s), 1, len(known_s) - 1) if len(known_s) > 1 else None
+    if after is None:
+        return table
+    step_s = known_s[after] - known_s[after - 1]
+    longest_s = max(settings.gap_s, settings.gap_steps * float(np.median(np.diff(known_s))))
+    near = (step_s <= longest_s) & (at_s >= known_s[0]) & (at_s <= known_s[-1])
+    columns = {name: Column(np.interp(at_s, known_s, source.values(name)), near) for name in fields}
+    notes.append(InputNote("sampled_apart", f"{what} of {table.topic} interpolated to the times of the other sensor"))
+    return replace(made, columns=dict(made.columns) | columns)
 
 
 def _order(record_index: NDArray[np.int64], time_ns: NDArray[np.int64]) -> NDArray[np.intp]:

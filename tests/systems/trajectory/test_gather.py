@@ -331,6 +331,31 @@ def test_parts_of_a_sample_in_two_rows_are_one() -> None:
     assert len(gathered(made, fixes()).imu) == len(time_s)
 
 
+def test_sensors_sampled_apart_are_brought_to_one_time() -> None:
+    fast, slow = imu_times(), imu_times(step_s=0.025) - 0.0013
+    whole, force = samples(fast), samples(slow)
+    only_rates = {name: column for name, column in whole.columns.items() if name.startswith("rate")}
+    only_force = {name: column for name, column in force.columns.items() if name.startswith("accel")}
+    only_force["accel_x_mps2"] = Column(0.01 * slow)  # a ramp
+    time_s = np.concatenate((fast, slow))
+    order = np.argsort(time_s, kind="stable")
+    columns = {}
+    for parts, mask in (
+        (only_rates, np.arange(len(time_s)) < len(fast)),
+        (only_force, np.arange(len(time_s)) >= len(fast)),
+    ):
+        for name, column in parts.items():
+            values = np.zeros(len(time_s))
+            values[mask] = column.values
+            columns[name] = Column(values[order], mask[order])
+    time_ns = np.round(time_s[order] * NS_PER_S).astype(np.int64)
+    found = gathered(Table("imu", time_ns, columns, np.arange(len(time_ns)), Column(time_ns)), fixes())
+    assert "sampled_apart" in codes(found) and found.imu_facts.rate_hz == pytest.approx(100.0)
+    ramp = found.imu.delta_velocity_mps[1:, 0] / found.imu.interval_s[1:]
+    assert np.abs(ramp - 0.01 * (found.imu.time_s[1:] - 0.5 * STEP_S)).max() < 1e-6
+    assert found.imu_facts.gaps == 0 and len(found.imu) > 5990
+
+
 def test_a_stuck_axis_is_left_out_or_refused() -> None:
     time_s = imu_times()
     stuck = noise(len(time_s))[:, 0]
