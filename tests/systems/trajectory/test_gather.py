@@ -395,6 +395,7 @@ def test_no_unit_and_no_receiver_are_refused() -> None:
     assert "no inertial unit" in refused(fixes())
     assert "no GNSS receiver" in refused(samples(time_s))
     assert "no unit with three gyros" in refused(samples(time_s, rate_x_dps=None), fixes())
+    assert "imu has only 0.9 s" in refused(samples(imu_times(0.9)), fixes(step_s=0.1))
     assert "no time in common" in refused(samples(time_s + 1000.0), fixes())
     never = fixes(latitude_deg=None, longitude_deg=None, velocity_north_mps=None, fix=np.full(60, "none"))
     assert "never had a fix" in refused(samples(time_s), replace(never, columns={"fix": never.columns["fix"]}))
