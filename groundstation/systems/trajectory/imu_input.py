@@ -178,9 +178,10 @@ def _samples(flight: Flight, topic: str, settings: InputSettings, notes: list[In
 
 
 def _at_one_time(table: Table, settings: InputSettings, notes: list[InputNote]) -> Table:
-    """Return a table whose rows have all six axes where rates and specific force are sampled apart.
+    """Return a table whose rows have all six axes.
 
-    The one with fewer samples is interpolated to the times of the other.
+    Where rates and specific force are sampled apart, the one with fewer samples is interpolated to the times of the
+    other.
     """
     has_rate, has_force = table.valid(*RATES), table.valid(*ACCELERATIONS)
     most = max(int(has_rate.sum()), int(has_force.sum()))
