@@ -1,4 +1,4 @@
-"""Topic ``imu`` from the increments of a SPAN system's inertial unit, RAWIMUX and RAWIMUSX.
+"""Topic ``imu`` from NovAtel's increments of an inertial unit, RAWIMUX and RAWIMUSX.
 
 Their counts are scaled by the type of the unit, which the messages state; RAWIMU and RAWIMUS do not and stay raw. Axes
 are the unit's own: x right, y forward, z up of its case become forward y, right x, down -z. The rotation from the case
@@ -38,7 +38,7 @@ class UnitScale(NamedTuple):
 
 
 def _epson(name: str, dps: float, thousandths_g: float, rate_hz: float) -> UnitScale:
-    """Return the scale of a unit whose counts are rates: increments over a sample of its own rate."""
+    """Return the scale of a unit whose counts are rates: over a sample of its own rate."""
     counts = 65_536.0 * rate_hz
     return UnitScale(name, dps / DEG_PER_RAD / counts, 1e-3 * thousandths_g * _STANDARD_G / counts)
 
@@ -84,7 +84,7 @@ _RAD, _MPS = _by_type(0), _by_type(1)
 
 
 def imu_batch(block: MessagesByName, source: str) -> RecordBatch | None:
-    """Return one row for each message of a block with counts of a known unit; None where it has none."""
+    """Return one row for each message with counts of a known unit; None where none has."""
     messages, fields = block.get(source), block.fields(source)
     if not isinstance(messages, TimedMessages) or fields is None:
         return None

@@ -1,4 +1,4 @@
-"""Topic ``imu`` from the measurements of a u-blox receiver's own sensors, ESF-MEAS or ESF-RAW.
+"""Topic ``imu`` from a u-blox receiver's own sensors, ESF-MEAS or ESF-RAW.
 
 Axes are those of the receiver; the alignment that it finds is not applied. Times are those of its counter, set by the
 messages with a full time around: the delay of their output stays in them.

@@ -31,7 +31,9 @@ def gather(flight: Flight, known: Known, settings: InputSettings) -> Gathered:
     imu, gnss = imu_of(flight, settings), gnss_of(flight, known.excluded_s, settings)
     start_s, end_s = float(imu.imu.time_s[0]), float(imu.imu.time_s[-1])
     common = np.count_nonzero((gnss.gnss.time_s >= start_s) & (gnss.gnss.time_s <= end_s))
-    if common < 2 or end_s - start_s < LEAST_OVERLAP_S:
+    if common >= 2 and end_s - start_s < LEAST_OVERLAP_S:
+        raise NotAssessableError(SUBJECT, f"{imu.facts.topic} has only {end_s - start_s:.1f} s")
+    if common < 2:
         names = f"{imu.facts.topic} ({start_s:.0f} to {end_s:.0f} s) and {gnss.facts.topic}"
         span = f"{gnss.gnss.time_s[0]:.0f} to {gnss.gnss.time_s[-1]:.0f} s"
         raise NotAssessableError(SUBJECT, f"{names} ({span}) have no time in common")

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.errors import NotAssessableError
-from groundstation.base.records import BoolArray
+from groundstation.base.records import BoolArray, Column
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.base.words import clock_text, counted, listed
@@ -59,7 +59,7 @@ class _Samples:
     def __len__(self) -> int:
         return len(self.time_s)
 
-    def take(self, rows: NDArray[np.intp] | BoolArray) -> "_Samples":
+    def take(self, rows: NDArray[np.intp] | BoolArray | slice) -> "_Samples":
         """Return some of the samples."""
         interval_s = None if self.interval_s is None else self.interval_s[rows]
         return _Samples(self.time_s[rows], self.rates[rows], interval_s, self.clipped[rows])
@@ -154,6 +154,8 @@ def _samples(flight: Flight, topic: str, settings: InputSettings, notes: list[In
     fields = _fields_of(table)
     if 2 * np.count_nonzero(table.valid(*fields)) < len(table) and not (np.diff(table.time_ns) > 0).all():
         table = table.unique_times()  # parts of a sample in several rows
+    if fields == SAMPLES:
+        table = _at_one_time(table, settings, notes)
     whole = table.valid(*fields)
     absent = int(len(table) - np.count_nonzero(whole))
     if absent:
@@ -173,6 +175,33 @@ def _samples(flight: Flight, topic: str, settings: InputSettings, notes: list[In
         values[:, :3] /= DEG_PER_RAD
         return _without_repeats(_Samples(time_s, values, None, clipped), topic, notes), False
     return _integrated(_Samples(time_s, values, None, clipped), table, settings, notes)
+
+
+def _at_one_time(table: Table, settings: InputSettings, notes: list[InputNote]) -> Table:
+    """Return a table whose rows have all six axes.
+
+    Where rates and specific force are sampled apart, the one with fewer samples is interpolated to the times of the
+    other.
+    """
+    has_rate, has_force = table.valid(*RATES), table.valid(*ACCELERATIONS)
+    most = max(int(has_rate.sum()), int(has_force.sum()))
+    if 2 * np.count_nonzero(has_rate & has_force) >= most:
+        return table
+    base, other, fields, what = has_rate, has_force, ACCELERATIONS, "specific force"
+    if has_force.sum() > has_rate.sum():
+        base, other, fields, what = has_force, has_rate, RATES, "rates"
+    made, source = table.take(base), table.take(other)
+    start_ns = int(table.time_ns[0])
+    at_s, known_s = (made.time_ns - start_ns) / 1e9, (source.time_ns - start_ns) / 1e9
+    after = np.clip(np.searchsorted(known_s, at_s), 1, len(known_s) - 1) if len(known_s) > 1 else None
+    if after is None:
+        return table
+    step_s = known_s[after] - known_s[after - 1]
+    longest_s = max(settings.gap_s, settings.gap_steps * float(np.median(np.diff(known_s))))
+    near = (step_s <= longest_s) & (at_s >= known_s[0]) & (at_s <= known_s[-1])
+    columns = {name: Column(np.interp(at_s, known_s, source.values(name)), near) for name in fields}
+    notes.append(InputNote("sampled_apart", f"{what} of {table.topic} interpolated to the times of the other sensor"))
+    return replace(made, columns=dict(made.columns) | columns)
 
 
 def _order(record_index: NDArray[np.int64], time_ns: NDArray[np.int64]) -> NDArray[np.intp]:
@@ -208,8 +237,11 @@ def _integrated(
     found = _without_repeats(found, table.topic, notes)
     assert found.interval_s is not None
     step = np.diff(found.time_s)
-    near = (step > 0.0) & (step <= settings.segment_s)
-    covered = float(found.interval_s[1:][near].sum() / step[near].sum()) if near.any() else 1.0
+    near = np.abs(step) <= settings.segment_s  # jitter cancels
+    covered = float(found.interval_s[1:][near].sum() / max(float(step[near].sum()), 1e-9)) if near.any() else 1.0
+    if covered > settings.covered_share_max:
+        text = f"increments of {table.topic} cover {100.0 * covered:.0f} % of the time: they overlap"
+        raise NotAssessableError(SUBJECT, text)
     if covered < settings.covered_share_min:
         text = f"increments of {table.topic} cover {100.0 * covered:.0f} % of the time: they are taken as samples"
         notes.append(InputNote("point_samples", text))
@@ -232,14 +264,15 @@ def _without_repeats(samples: _Samples, topic: str, notes: list[InputNote]) -> _
 
     They have the same stamp and values; or the same values, where the log holds many.
     """
-    same = np.zeros(len(samples), dtype=bool)
-    same[1:] = (np.diff(samples.rates, axis=0) == 0.0).all(axis=1)
+    same = np.ones(len(samples), dtype=bool)
+    same[0] = False
+    kept = [samples.rates[1:, axis] == samples.rates[:-1, axis] for axis in range(6)]
+    for one in kept:
+        same[1:] &= one
     at_once = same.copy()
     at_once[1:] &= np.diff(samples.time_s) == 0.0
     others = ~same[1:]
-    by_chance = (
-        float(np.prod([np.mean(np.diff(column)[others] == 0.0) for column in samples.rates.T])) if others.any() else 1.0
-    )
+    by_chance = float(np.prod([np.mean(one[others]) for one in kept])) if others.any() else 1.0
     held = same & ~at_once
     drop = at_once
     if np.mean(held) > max(REPEATED_SHARE, 3.0 * by_chance):
@@ -267,10 +300,10 @@ def _without_stuck(samples: _Samples, topic: str, settings: InputSettings, notes
     NotAssessableError
         Where hardly anything is left.
     """
-    keeps = np.diff(samples.rates, axis=0) == 0.0
     bad = np.zeros(len(samples), dtype=bool)
     for axis, name in enumerate(AXES):
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], keeps[:, axis], [False])).astype(np.int8)))
+        keeps = samples.rates[1:, axis] == samples.rates[:-1, axis]
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], keeps, [False])).astype(np.int8)))
         places, count = [], 0
         for start, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
             if samples.time_s[end] - samples.time_s[start] > settings.stuck_s and _moves(samples.rates[start:end]):
@@ -364,7 +397,7 @@ def _timed(samples: _Samples, settings: InputSettings) -> _Timed:
     repeated = int(np.count_nonzero(np.diff(samples.time_s) == 0.0))
     moved = wandering = dropped = 0
     parts = sorted(
-        (samples.take(np.arange(len(samples))[one]) for one in blocks_of(samples.time_s, settings.segment_s)),
+        (samples.take(one) for one in blocks_of(samples.time_s, settings.segment_s)),
         key=lambda part: float(part.time_s[0]),
     )
     end_s = -np.inf
@@ -378,7 +411,8 @@ def _timed(samples: _Samples, settings: InputSettings) -> _Timed:
         wandering += len(part) if line.wanders else 0
         residuals.append(line.residual_s if line.is_moved else np.zeros(len(part)))
         starts.append(sum(map(len, pieces)))
-        pieces.append(replace(part, time_s=line.time_s).take(keep))
+        timed = replace(part, time_s=line.time_s)
+        pieces.append(timed if keep.all() else timed.take(keep))
         end_s = float(pieces[-1].time_s[-1])
     residual_s = np.abs(np.concatenate(residuals)) if residuals else np.zeros(1)
     jitter_s = float(np.sqrt(np.mean(residual_s**2)))
@@ -394,13 +428,17 @@ def _timed(samples: _Samples, settings: InputSettings) -> _Timed:
     if dropped:
         text = f"{counted(dropped, 'sample')} whose time goes back or repeats: left out"
         notes.append(InputNote("backward", text, dropped))
-    joined = _Samples(
+    joined = pieces[0] if len(pieces) == 1 else _joined(pieces)
+    return _Timed(joined, tuple(starts), jitter_s, float(residual_s.max()), tuple(notes))
+
+
+def _joined(pieces: list[_Samples]) -> _Samples:
+    return _Samples(
         np.concatenate([one.time_s for one in pieces]),
         np.concatenate([one.rates for one in pieces]),
-        None if samples.interval_s is None else np.concatenate([_of(one) for one in pieces]),
+        None if pieces[0].interval_s is None else np.concatenate([_of(one) for one in pieces]),
         np.concatenate([one.clipped for one in pieces]),
     )
-    return _Timed(joined, tuple(starts), jitter_s, float(residual_s.max()), tuple(notes))
 
 
 def _of(samples: _Samples) -> FloatArray:
@@ -426,17 +464,21 @@ def _increments(timed: _Timed, settings: InputSettings) -> tuple[ImuIncrements, 
     usual_s = _usual_steps(step_s, timed.starts, count)
     own_s = usual_s if samples.interval_s is None else samples.interval_s
     is_gap = step_s > np.maximum(settings.gap_s, settings.gap_steps * usual_s)
-    before = np.concatenate((samples.rates[:1], samples.rates[:-1]))
-    mean = 0.5 * (before + samples.rates)
     if samples.interval_s is None:
         interval_s = np.where(is_gap, own_s, step_s)
         interval_s[1:] = np.minimum(interval_s[1:], step_s[1:])
-        integrals = np.where(is_gap[:, None], samples.rates, mean) * interval_s[:, None]
+        integrals = samples.rates.copy()
+        joins = ~is_gap[1:]
+        integrals[1:][joins] += samples.rates[:-1][joins]
+        integrals[1:][joins] *= 0.5
+        integrals *= interval_s[:, None]
     else:
         missing_s = np.where(is_gap, 0.0, step_s - own_s)
         missing_s = np.where(missing_s > MISSING * np.minimum(usual_s, own_s), missing_s, 0.0)
         interval_s = own_s + missing_s
-        integrals = samples.rates * own_s[:, None] + mean * missing_s[:, None]
+        integrals = samples.rates * own_s[:, None]
+        late = np.flatnonzero(missing_s)
+        integrals[late] += 0.5 * (samples.rates[late - 1] + samples.rates[late]) * missing_s[late, None]
     late_s = np.where(is_gap, 0.0, interval_s - own_s)
     bridged_s = float(late_s[late_s > MISSING * np.minimum(usual_s, own_s)].sum())
     gaps_s = (step_s - own_s)[1:][is_gap[1:]]

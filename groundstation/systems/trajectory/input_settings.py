@@ -23,5 +23,6 @@ class InputSettings:
     stuck_s: float = number(5.0, 0.5, 600.0)  # an axis that keeps one value for so long, while others move, is stuck
     stuck_share_max: float = number(0.5, 0.0, 1.0)  # of the samples: with more of them stuck a unit is none
     covered_share_min: float = number(0.8, 0.0, 1.0)  # increments of less of the time are taken as samples
+    covered_share_max: float = number(1.2, 1.0, 10.0)  # increments of more of the time overlap
     accel_low_mps2: float = number(6.0, 0.0, 9.8)  # median specific force outside: not in m/s2, or no such sensor
     accel_high_mps2: float = number(14.0, 9.8, 1000.0)

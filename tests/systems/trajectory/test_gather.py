@@ -189,7 +189,7 @@ def test_jitter_beyond_a_step_with_lost_samples() -> None:
     keep = np.ones(len(time_s), dtype=bool)
     keep[[4000, 4001, 4002, 9000, 9001, 9002, 9003, 9004]] = False
     stamp_s = time_s + rng.normal(0.0, 0.003, len(time_s))
-    found = gathered(samples(time_s, stamp_s).take(np.argsort(np.argsort(stamp_s))), fixes())
+    found = gathered(samples(time_s, stamp_s), fixes())
     assert (np.diff(found.imu.time_s) > 0.0).all()
     lost = on_a_line(stamp_s[keep])
     assert lost.lost == 8 and lost.is_moved
@@ -197,6 +197,13 @@ def test_jitter_beyond_a_step_with_lost_samples() -> None:
     near = np.zeros(len(error_s), dtype=bool)  # the place of a loss is known to some samples only
     near[3950:4050], near[8940:9050] = True, True
     assert np.abs(error_s[~near]).max() < 0.0008
+
+
+def test_increments_stay_increments_under_jitter_beyond_a_step() -> None:
+    time_s = imu_times()
+    stamp_s = time_s + np.random.default_rng(8).normal(0.0, 0.012, len(time_s))
+    found = gathered(increments(time_s, stamp_s), fixes())
+    assert found.imu.is_integral and found.imu.interval_s == pytest.approx(STEP_S)
 
 
 def test_batches_that_share_a_stamp_are_spread() -> None:
@@ -267,6 +274,11 @@ def test_increments_of_a_part_of_the_time_are_samples() -> None:
     assert found.imu.interval_s.sum() == pytest.approx(WHOLE_S, abs=0.1)
 
 
+def test_increments_that_overlap_are_refused() -> None:
+    time_s = imu_times()
+    assert "cover 200 % of the time" in refused(increments(time_s, interval_s=np.full(len(time_s), 0.02)), fixes())
+
+
 def test_samples_logged_twice_and_backward_stamps() -> None:
     time_s = imu_times()
     twice = np.sort(np.concatenate((np.arange(len(time_s)), np.arange(100, 200))))
@@ -319,6 +331,31 @@ def test_parts_of_a_sample_in_two_rows_are_one() -> None:
     assert len(gathered(made, fixes()).imu) == len(time_s)
 
 
+def test_sensors_sampled_apart_are_brought_to_one_time() -> None:
+    fast, slow = imu_times(), imu_times(step_s=0.025) - 0.0013
+    whole, force = samples(fast), samples(slow)
+    only_rates = {name: column for name, column in whole.columns.items() if name.startswith("rate")}
+    only_force = {name: column for name, column in force.columns.items() if name.startswith("accel")}
+    only_force["accel_x_mps2"] = Column(0.01 * slow)  # a ramp
+    time_s = np.concatenate((fast, slow))
+    order = np.argsort(time_s, kind="stable")
+    columns = {}
+    for parts, mask in (
+        (only_rates, np.arange(len(time_s)) < len(fast)),
+        (only_force, np.arange(len(time_s)) >= len(fast)),
+    ):
+        for name, column in parts.items():
+            values = np.zeros(len(time_s))
+            values[mask] = column.values
+            columns[name] = Column(values[order], mask[order])
+    time_ns = np.round(time_s[order] * NS_PER_S).astype(np.int64)
+    found = gathered(Table("imu", time_ns, columns, np.arange(len(time_ns)), Column(time_ns)), fixes())
+    assert "sampled_apart" in codes(found) and found.imu_facts.rate_hz == pytest.approx(100.0)
+    ramp = found.imu.delta_velocity_mps[1:, 0] / found.imu.interval_s[1:]
+    assert np.abs(ramp - 0.01 * (found.imu.time_s[1:] - 0.5 * STEP_S)).max() < 1e-6
+    assert found.imu_facts.gaps == 0 and len(found.imu) > 5990
+
+
 def test_a_stuck_axis_is_left_out_or_refused() -> None:
     time_s = imu_times()
     stuck = noise(len(time_s))[:, 0]
@@ -358,6 +395,7 @@ def test_no_unit_and_no_receiver_are_refused() -> None:
     assert "no inertial unit" in refused(fixes())
     assert "no GNSS receiver" in refused(samples(time_s))
     assert "no unit with three gyros" in refused(samples(time_s, rate_x_dps=None), fixes())
+    assert "imu has only 0.9 s" in refused(samples(imu_times(0.9)), fixes(step_s=0.1))
     assert "no time in common" in refused(samples(time_s + 1000.0), fixes())
     never = fixes(latitude_deg=None, longitude_deg=None, velocity_north_mps=None, fix=np.full(60, "none"))
     assert "never had a fix" in refused(samples(time_s), replace(never, columns={"fix": never.columns["fix"]}))

@@ -121,7 +121,9 @@ def test_without_a_filter_on_board_nothing_is_said_of_it() -> None:
 
 def test_a_filter_that_is_right_is_said_to_be() -> None:
     section = section_of(ANSWERS["hover"])
-    assert notes(section)[0].startswith("The on-board filter is nowhere wrong beyond 95 % for two seconds; it differs by heading 0.0")
+    assert notes(section)[0].startswith(
+        "The on-board filter is nowhere wrong beyond 95 % for two seconds; it differs by heading 0.0"
+    )
     assert {getattr(row[-1], "text", "") for row in grid(section, "Errors of the on-board").rows} == {"nowhere"}
 
 
