@@ -104,10 +104,13 @@ class Sums:
 
 
 def steps_of(imu: ImuIncrements, gnss: GnssFixes, settings: MountingSettings) -> Steps:
-    """Return the steps of a log; those of GNSS that lost fixes are left out."""
-    known = np.flatnonzero(np.isfinite(gnss.velocity_mps).all(axis=1))
+    """Return the steps of a log; those of GNSS that lost fixes are left out.
+
+    A receiver without a vertical velocity is taken to stay level.
+    """
+    known = np.flatnonzero(np.isfinite(gnss.velocity_mps[:, :2]).all(axis=1))
     chosen = known[_thinned(gnss.time_s[known], settings.step_s)]
-    time_s, velocity = gnss.time_s[chosen], gnss.velocity_mps[chosen]
+    time_s, velocity = gnss.time_s[chosen], np.nan_to_num(gnss.velocity_mps[chosen])
     length_s = np.diff(time_s)
     longest_s = FIX_GAP_STEPS * max(settings.step_s, float(np.median(length_s)) if len(length_s) else 0.0)
     fits = length_s <= min(longest_s, 2.0 * FIX_GAP_STEPS * settings.step_s)
