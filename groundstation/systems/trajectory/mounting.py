@@ -221,7 +221,8 @@ def _motion(imu: ImuIncrements, steps: Steps, settings: MountingSettings) -> _Mo
     if margin <= -settings.margin_min and relation_of(spans, sums, settings, rival).holds(settings):
         return _refused(_explained(every, settings), evidence)
     if not relation.holds(settings):
-        return _refused(UNRELATED, evidence) if has_real_motion(spans, settings) else evidence
+        moves = not steps.by_positions and has_real_motion(spans, settings)
+        return _refused(UNRELATED, evidence) if moves else evidence
     doubt = _explained(every, settings) if margin <= -settings.margin_doubt else ""
     return _Motion(steps, spans, sums, sound, evidence, doubt)
 

@@ -114,6 +114,14 @@ def test_receiver_without_vertical_velocity() -> None:
     assert mounting.source == "found" and np.array_equal(mounting.body_from_case, TURNS[5].T)
 
 
+def test_receiver_without_velocities() -> None:
+    """Those of its positions, where these are good enough."""
+    imu, gnss = simulated("drive", precise=True)
+    none = replace(gnss, velocity_mps=np.full(gnss.velocity_mps.shape, np.nan))
+    mounting = found((turned(imu, TURNS[9]), none), "drive")
+    assert mounting.source == "found" and np.array_equal(mounting.body_from_case, TURNS[9].T)
+
+
 # Not told
 
 
@@ -149,8 +157,8 @@ def test_nothing_to_look_at(count: int) -> None:
     fields = {name: getattr(imu, name) for name in imu.__dataclass_fields__ if name != "is_integral"}
     few = ImuIncrements(**{name: values[:count] for name, values in fields.items()})
     assert found((few, gnss), "drive").source == "refused"
-    unknown = replace(gnss, velocity_mps=np.full(gnss.velocity_mps.shape, np.nan))
-    assert found((imu, unknown), "drive").source == "case"
+    unknown = {name: np.full(getattr(gnss, name).shape, np.nan) for name in ("velocity_mps", "latitude_deg")}
+    assert found((imu, replace(gnss, **unknown)), "drive").source == "case"
 
 
 # Refused
