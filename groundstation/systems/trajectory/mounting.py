@@ -281,7 +281,7 @@ def _found(
 
 
 def _moves_as_on_wheels(agree: Correlations) -> bool:
-    """Tell whether force forward and to the right is what speeding up and turning need, as on wheels."""
+    """Tell whether the force is what speeding up and turning need, as on wheels."""
     return min(agree.along, agree.across, agree.turning) >= ON_WHEELS
 
 
