@@ -55,7 +55,9 @@ def _steps(gnss: GnssFixes) -> tuple[FloatArray, FloatArray]:
     North, east, up, shape (n, 3).
     """
     known = (
-        np.isfinite(gnss.velocity_mps).all(axis=1) & np.isfinite(gnss.latitude_deg) & np.isfinite(gnss.longitude_deg)
+        np.isfinite(gnss.velocity_mps[:, :2]).all(axis=1)
+        & np.isfinite(gnss.latitude_deg)
+        & np.isfinite(gnss.longitude_deg)
     )
     time_s, velocity = gnss.time_s[known], gnss.velocity_mps[known]
     if len(time_s) < 2:

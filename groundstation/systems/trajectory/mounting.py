@@ -49,6 +49,7 @@ from groundstation.tables.vehicle import VehicleKind
 
 Source = Literal["stated", "logged", "found", "case", "refused"]
 LEAST_CORRELATION = 0.5  # of the looks at what rolls
+ON_WHEELS = 0.7  # likewise, of a vehicle of unknown kind; a bank leaves no force to the side
 SHIPPED = MountingSettings()
 UNRELATED = "its motion is not that of GNSS: a unit of another vehicle, or of another time"
 MIRRORED = "its axes are left-handed: one is turned round, or two are swapped"
@@ -221,7 +222,8 @@ def _motion(imu: ImuIncrements, steps: Steps, settings: MountingSettings) -> _Mo
     if margin <= -settings.margin_min and relation_of(spans, sums, settings, rival).holds(settings):
         return _refused(_explained(every, settings), evidence)
     if not relation.holds(settings):
-        return _refused(UNRELATED, evidence) if has_real_motion(spans, settings) else evidence
+        moves = not steps.by_positions and has_real_motion(spans, settings)
+        return _refused(UNRELATED, evidence) if moves else evidence
     doubt = _explained(every, settings) if margin <= -settings.margin_doubt else ""
     return _Motion(steps, spans, sums, sound, evidence, doubt)
 
@@ -256,23 +258,31 @@ def _found(
         gravity = gravity_of(steps)
         told = replace(motion, gravity_concentration=gravity.concentration)
         return _of_case(f"too little motion shows how it stands{_down_told(gravity)}", told)
-    flies = vehicle not in ("rolls", "walks")
-    speed = settings.flight_speed_min_mps if flies else settings.speed_min_mps
+    speed = settings.speed_min_mps if vehicle in ("rolls", "walks", None) else settings.flight_speed_min_mps
     looks = looks_of(steps, motion.spans, motion.sums, motion.sound.lag_s, speed, settings)
     turn, evidence = _nearest(looks, motion.evidence)
-    agree = correlations(steps, motion.sums, turn, motion.sound.lag_s, speed, rolls=not flies)
+    measured = evidence.measured_deg
+    body_from_case = turn if measured is None else from_angles(measured)
+    rolls = vehicle in ("rolls", None)
+    agree = correlations(steps, motion.sums, body_from_case, motion.sound.lag_s, speed, rolls=rolls)
     evidence = _with(evidence, agree)
     if vehicle == "walks":
         return _of_case("what is carried has no forward", evidence)
-    if evidence.measured_deg is None or looks.travel.count < settings.travel_steps_min:
+    if measured is None or looks.travel.count < settings.travel_steps_min:
         return _of_case("too little travel shows which way is forward", evidence)
     if min(looks.travel.concentration, looks.gravity.concentration) < settings.concentration_min:
         return _of_case("it does not travel along one axis of the case", evidence)
-    if flies and not flies_nose_first(steps, agree, settings):
-        return _of_case("a craft that may fly in any direction does not show which way is forward", evidence)
-    if not flies and _contradicts(agree):
-        return _refused("speeding up, turning and travel do not show the same forward and right", evidence)
-    return _turned(turn, evidence.measured_deg, evidence, settings)
+    if vehicle == "rolls":
+        if _contradicts(agree):
+            return _refused("speeding up, turning and travel do not show the same forward and right", evidence)
+    elif not (vehicle is None and _moves_as_on_wheels(agree)) and not flies_nose_first(steps, agree, settings):
+        return _of_case("a craft that may move in any direction does not show which way is forward", evidence)
+    return _turned(turn, measured, evidence, settings)
+
+
+def _moves_as_on_wheels(agree: Correlations) -> bool:
+    """Tell whether the force is what speeding up and turning need, as on wheels."""
+    return min(agree.along, agree.across, agree.turning) >= ON_WHEELS
 
 
 def _down_told(gravity: Direction) -> str:

@@ -1,25 +1,15 @@
-"""Constant offsets: of the case to the travel, of an on-board filter to our attitude.
-
-A constant offset is mounting: how a case stands to the body, or how a filter's axes stand to the case. It is never
-counted as error of a filter.
-"""
+"""Constant offset of the case to the travel of what rolls, with sigmas."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
-from groundstation.base.attitude import rotation_n_from_b
-from groundstation.base.records import frozen
-from groundstation.systems.trajectory.axis_hypotheses import rotations
-from groundstation.systems.trajectory.axis_turns import angles_of
 
 BLOCK_S = 30.0  # longer than errors of GNSS velocity and of tilt hang together
 FEWEST_BLOCKS = 4
 GAUSSIAN_MAD = 1.4826
 MEDIAN_LOSS = 1.2533  # sigma of a median over that of a mean
-ROUNDS = 20
-LARGE = 3.0  # sigmas of a robust spread, beyond which a sample counts less
 
 
 @dataclass(frozen=True)
@@ -114,95 +104,3 @@ def _median_and_sigma(blocks: FloatArray, *, is_angle: bool = False) -> tuple[fl
     spread = GAUSSIAN_MAD * float(np.median(np.abs(blocks - middle)))
     sigma = MEDIAN_LOSS * spread / float(np.sqrt(len(blocks)))
     return (float(wrap_180(middle)) if is_angle else middle), sigma
-
-
-@dataclass(frozen=True)
-class SplitAttitude:
-    """Attitude of a filter against ours: a constant offset, which is mounting, and the rest.
-
-    Parameters
-    ----------
-    offset_deg, offset_sigma_deg : ndarrays, shape (3,)
-        Roll, pitch and yaw of the filter's axes to ours, constant in the body, and their sigmas; the offset is zero and
-        the sigmas NaN where there are too few stretches.
-    rest_deg : ndarray, shape (n, 3)
-        What remains in roll, pitch and heading, filter minus ours; NaN where either is unknown.
-    """
-
-    offset_deg: FloatArray
-    offset_sigma_deg: FloatArray
-    rest_deg: FloatArray
-
-
-def split_attitude(time_s: FloatArray, onboard_deg: FloatArray, ours_deg: FloatArray) -> SplitAttitude:
-    """Split the attitude of a filter against ours into a constant offset and the rest.
-
-    Parameters
-    ----------
-    time_s : ndarray, shape (n,)
-    onboard_deg, ours_deg : ndarrays, shape (n, 3)
-        Roll, pitch, heading at the same times.
-
-    Notes
-    -----
-    With n_from_filter = n_from_ours M, the offset is the constant M, found as the robust mean of the rotations
-    (weights of Huber about the mean, iterated), and the rest is between n_from_filter M' and n_from_ours. On level
-    ground a constant error of heading looks the same as a yaw of the mounting: it is taken for mounting.
-    """
-    known = np.isfinite(onboard_deg).all(axis=1) & np.isfinite(ours_deg).all(axis=1)
-    rest = np.full((len(time_s), 3), np.nan)
-    if not known.any():
-        return SplitAttitude(frozen(np.zeros(3)), frozen(np.full(3, np.nan)), frozen(rest))
-    filters, ours = rotation_n_from_b(onboard_deg[known]), rotation_n_from_b(ours_deg[known])
-    between = np.swapaxes(ours, 1, 2) @ filters
-    mean, sigma = _mean_rotation(time_s[known], between)
-    corrected = angles_of(filters @ mean.T)
-    rest[known] = wrap_180(corrected - angles_of(ours))
-    return SplitAttitude(frozen(angles_of(mean)), frozen(sigma), frozen(rest))
-
-
-def _mean_rotation(time_s: FloatArray, between: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the robust mean of rotations, and sigmas of its vector in degrees.
-
-    The identity where there is too little of them.
-    """
-    mean = _nearest_rotation(between.mean(axis=0))
-    for _ in range(ROUNDS):
-        vectors = _vectors(mean.T @ between)
-        size = np.linalg.norm(vectors, axis=1)
-        limit = LARGE * GAUSSIAN_MAD * float(np.median(size)) + 1e-12
-        weight = np.minimum(1.0, limit / np.maximum(size, 1e-15))
-        step = (weight[:, None] * vectors).sum(axis=0) / weight.sum()
-        mean = mean @ rotations(step)
-        if float(np.linalg.norm(step)) < 1e-10:
-            break
-    vectors = np.rad2deg(_vectors(mean.T @ between))
-    each = [_blocks(time_s, vectors[:, k]) for k in range(3)]
-    if len(each[0]) < FEWEST_BLOCKS:
-        return np.eye(3), np.full(3, np.nan)
-    return mean, np.array([_median_and_sigma(one)[1] for one in each])
-
-
-def _nearest_rotation(matrix: FloatArray) -> FloatArray:
-    left, _, right = np.linalg.svd(matrix)
-    fix = np.diag([1.0, 1.0, float(np.sign(np.linalg.det(left @ right)))])
-    found: FloatArray = left @ fix @ right
-    return found
-
-
-def _vectors(rotation: FloatArray) -> FloatArray:
-    """Return rotation vectors, shape (n, 3), in radians, of rotations below a half turn."""
-    cross = 0.5 * np.stack(
-        [
-            rotation[:, 2, 1] - rotation[:, 1, 2],
-            rotation[:, 0, 2] - rotation[:, 2, 0],
-            rotation[:, 1, 0] - rotation[:, 0, 1],
-        ],
-        axis=1,
-    )
-    cosine = np.clip(0.5 * (np.einsum("nii->n", rotation) - 1.0), -1.0, 1.0)
-    sine = np.linalg.norm(cross, axis=1)
-    angle = np.arctan2(sine, cosine)
-    factor = np.where(sine > 1e-9, angle / np.maximum(sine, 1e-12), 1.0)
-    found: FloatArray = cross * factor[:, None]
-    return found

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.geodesy import north_east_m
 from groundstation.base.records import Int64Array
 from groundstation.systems.trajectory.inputs import GnssFixes, ImuIncrements
 from groundstation.systems.trajectory.mounting_settings import MountingSettings
@@ -37,6 +38,8 @@ class Steps:
         Change of track, to the right; NaN where too slow to have one.
     rate_radps, force_mps2 : ndarrays, shape (n, 3)
         Means of the unit in the axes of its case; NaN where it has a gap.
+    by_positions : bool
+        The receiver has no velocities; those of its positions are smoothed noise as much as motion.
     """
 
     start_s: FloatArray
@@ -46,6 +49,7 @@ class Steps:
     turned_rad: FloatArray
     rate_radps: FloatArray
     force_mps2: FloatArray
+    by_positions: bool = False
 
     def __len__(self) -> int:
         return len(self.start_s)
@@ -104,10 +108,11 @@ class Sums:
 
 
 def steps_of(imu: ImuIncrements, gnss: GnssFixes, settings: MountingSettings) -> Steps:
-    """Return the steps of a log; those of GNSS that lost fixes are left out."""
-    known = np.flatnonzero(np.isfinite(gnss.velocity_mps).all(axis=1))
-    chosen = known[_thinned(gnss.time_s[known], settings.step_s)]
-    time_s, velocity = gnss.time_s[chosen], gnss.velocity_mps[chosen]
+    """Return the steps of a log; those of GNSS that lost fixes are left out.
+
+    A receiver without a vertical velocity is taken to stay level; one without velocities has those of its positions.
+    """
+    time_s, velocity = _velocities(gnss, settings.step_s)
     length_s = np.diff(time_s)
     longest_s = FIX_GAP_STEPS * max(settings.step_s, float(np.median(length_s)) if len(length_s) else 0.0)
     fits = length_s <= min(longest_s, 2.0 * FIX_GAP_STEPS * settings.step_s)
@@ -126,7 +131,24 @@ def steps_of(imu: ImuIncrements, gnss: GnssFixes, settings: MountingSettings) ->
         np.where(slow, np.nan, turned),
         angle / each_s,
         gathered / each_s,
+        not np.isfinite(gnss.velocity_mps[:, :2]).all(axis=1).any(),
     )
+
+
+def _velocities(gnss: GnssFixes, step_s: float) -> tuple[FloatArray, FloatArray]:
+    """Return times about a step apart, and velocities at them."""
+    known = np.flatnonzero(np.isfinite(gnss.velocity_mps[:, :2]).all(axis=1))
+    chosen = known[_thinned(gnss.time_s[known], step_s)]
+    if len(chosen):
+        return gnss.time_s[chosen], np.nan_to_num(gnss.velocity_mps[chosen])
+    placed = np.flatnonzero(np.isfinite(gnss.latitude_deg) & np.isfinite(gnss.longitude_deg))
+    chosen = placed[_thinned(gnss.time_s[placed], step_s)]
+    if len(chosen) < 3:
+        return np.zeros(0), np.zeros((0, 3))
+    latitude, longitude, time_s = gnss.latitude_deg[chosen], gnss.longitude_deg[chosen], gnss.time_s[chosen]
+    north, east = north_east_m(latitude, longitude, float(latitude[0]), float(longitude[0]))
+    place = np.column_stack([north, east, np.zeros(len(chosen))])
+    return time_s[1:-1], (place[2:] - place[:-2]) / (time_s[2:] - time_s[:-2])[:, None]
 
 
 def _thinned(time_s: FloatArray, step_s: float) -> Int64Array:

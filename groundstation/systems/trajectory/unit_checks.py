@@ -3,6 +3,7 @@
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.records import BoolArray
 from groundstation.systems.trajectory.inputs import ImuIncrements
 from groundstation.systems.trajectory.mounting_settings import MountingSettings
 from groundstation.systems.trajectory.short_spans import GRAVITY_MPS2, QUIET_MPS2, Steps
@@ -18,29 +19,33 @@ def stuck_axis(imu: ImuIncrements) -> str:
 
     An axis is stuck while its value stays the same though others change.
     """
-    interval_s = imu.interval_s[:, None]
-    values = np.concatenate([imu.delta_angle_rad / interval_s, imu.delta_velocity_mps / interval_s], axis=1)
-    if len(values) < 3:
+    if len(imu) < 3:
         return ""
-    same = np.abs(np.diff(values, axis=0)) <= SAME * np.abs(values[1:]) + 1e-12
-    moves = ~same.all(axis=1)
+    same = [_stays(imu, axis) for axis in range(len(AXES))]
+    moves = ~np.logical_and.reduce(same)
     limit_s = max(STUCK_S, STUCK_SHARE * float(imu.time_s[-1] - imu.time_s[0]))
     for axis, name in enumerate(AXES):
-        length_s, value = _longest_stuck(imu.time_s, same[:, axis], moves, values[1:, axis])
-        if length_s >= limit_s:
-            return f"{name} is stuck: {value:.4g} for {length_s:.0f} s while other axes change"
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], same[axis].astype(np.int8), [0]])))
+        lengths_s = imu.time_s[edges[1::2]] - imu.time_s[edges[::2]]
+        for run in np.flatnonzero(lengths_s >= limit_s):
+            start, end = edges[2 * run], edges[2 * run + 1]
+            if moves[start:end].mean() > 0.5:
+                value = _values(imu, axis)[start + 1]
+                return f"{name} is stuck: {value:.4g} for {lengths_s[run]:.0f} s while other axes change"
     return ""
 
 
-def _longest_stuck(time_s: FloatArray, same: FloatArray, moves: FloatArray, values: FloatArray) -> tuple[float, float]:
-    """Return length and value of the longest run of one value while another axis changes."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
-    best = (0.0, 0.0)
-    for start, end in zip(edges[::2], edges[1::2], strict=True):
-        length_s = float(time_s[end] - time_s[start])
-        if length_s > best[0] and moves[start:end].mean() > 0.5:
-            best = (length_s, float(values[start]))
-    return best
+def _values(imu: ImuIncrements, axis: int) -> FloatArray:
+    """Return the mean rate or force of an axis over each interval."""
+    found: FloatArray = (imu.delta_angle_rad, imu.delta_velocity_mps)[axis // 3][:, axis % 3] / imu.interval_s
+    return found
+
+
+def _stays(imu: ImuIncrements, axis: int) -> BoolArray:
+    """Tell at which samples an axis has the value of the sample before."""
+    values = _values(imu, axis)
+    stays: BoolArray = np.abs(np.diff(values)) <= SAME * np.abs(values[1:]) + 1e-12
+    return stays
 
 
 def wrong_force(steps: Steps, settings: MountingSettings) -> str:

@@ -186,6 +186,12 @@ def test_mounting_is_taken_out_of_the_platforms_number_alone_and_its_sigma_enter
     assert mounted.azimuth == (mounted.platform_error_deg, mounted.platform_standard_error_deg)
 
 
+def test_mounting_of_the_inertial_unit_is_told_and_changes_nothing(flight: Flight, result: HeadingResult) -> None:
+    stated = estimate(flight, aircraft=replace(AIRCRAFT, imu_mounting_deg=(180.0, 0.0, 180.0)))
+    assert stated.settings["aircraft.imu_mounting_deg"] == "180, 0, 180"
+    assert stated.error_deg == result.error_deg
+
+
 def test_the_parts_of_the_interval_add_up(result: HeadingResult) -> None:
     assert [part.name for part in result.interval_parts] == ["taxi", "wind", "installation"]
     whole = np.sqrt(sum(part.sigma_deg**2 for part in result.interval_parts))

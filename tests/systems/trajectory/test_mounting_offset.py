@@ -1,18 +1,15 @@
-"""Constant offsets: the case to the direction of travel, an on-board filter to ours; they are mounting, never error."""
+"""Constant offset of a case to the direction of travel: straights alone, medians, sigmas that hold."""
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180, wrap_360
-from groundstation.base.attitude import rotation_n_from_b
-from groundstation.systems.trajectory.axis_turns import angles_of, from_angles
-from groundstation.systems.trajectory.mounting_offset import split_attitude, travel_offset
+from groundstation.systems.trajectory.mounting_offset import travel_offset
 
 FloatArray = NDArray[np.float64]
 RATE_HZ, LENGTH_S = 10.0, 1200.0
 YAW_DEG, PITCH_DEG = 3.2, -1.7
-OFFSET_DEG = np.array([2.0, -3.0, 175.0])
 SIGMAS = 4.0
 RUNS = 40
 
@@ -75,54 +72,3 @@ def test_without_straights_there_is_no_offset_to_travel() -> None:
     none = travel_offset(time_s[:0], heading[:0], pitch[:0], velocity[:0])
     for slow in (travel_offset(time_s, heading, pitch, 0.1 * velocity), none):
         assert np.isnan([slow.yaw_deg, slow.yaw_sigma_deg, slow.pitch_deg]).all() and slow.blocks == 0
-
-
-def attitudes(rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Time, and roll, pitch and heading of a body that banks and turns about."""
-    time_s = np.arange(0.0, LENGTH_S, 1.0 / RATE_HZ)
-    roll, pitch = 25.0 * np.sin(time_s / 9.0), 8.0 * np.sin(time_s / 23.0)
-    return time_s, np.column_stack([roll, pitch, wrap_360(rng.uniform(0.0, 360.0) + 3.0 * time_s)])
-
-
-def seen_by(ours_deg: FloatArray, offset_deg: FloatArray, error_deg: FloatArray) -> FloatArray:
-    """Attitude of a filter whose axes are turned against ours, with errors in roll, pitch and heading."""
-    return angles_of(rotation_n_from_b(ours_deg + error_deg) @ from_angles(offset_deg))
-
-
-def test_constant_offset_of_axes_is_mounting_and_leaves_nothing() -> None:
-    time_s, ours = attitudes(np.random.default_rng(1))
-    split = split_attitude(time_s, seen_by(ours, OFFSET_DEG, np.zeros_like(ours)), ours)
-    assert split.offset_deg == pytest.approx(OFFSET_DEG, abs=1e-6)
-    assert np.abs(split.rest_deg).max() < 1e-6
-
-
-def test_rest_is_the_error_of_the_filter() -> None:
-    """Errors that come and go are left; one over a tenth of the time does not pull the offset."""
-    time_s, ours = attitudes(np.random.default_rng(2))
-    error = np.zeros_like(ours)
-    error[(time_s > 500.0) & (time_s < 620.0), 2] = 12.0
-    error[:, 1] = 0.5 * np.sin(time_s / 7.0)
-    split = split_attitude(time_s, seen_by(ours, OFFSET_DEG, error), ours)
-    assert np.abs(wrap_180(split.offset_deg - OFFSET_DEG)).max() < 0.5
-    assert np.sqrt(np.mean((split.rest_deg - error) ** 2)) < 0.5
-    assert np.nanmedian(split.rest_deg[(time_s > 500.0) & (time_s < 620.0), 2]) == pytest.approx(12.0, abs=0.5)
-
-
-def test_sigmas_of_the_split_hold() -> None:
-    small, ratios = np.array([1.0, -2.0, 3.0]), []
-    for seed in range(RUNS):
-        rng = np.random.default_rng(seed)
-        time_s, ours = attitudes(rng)
-        error = np.repeat(rng.normal(0.0, 1.0, (len(time_s) // 50, 3)), 50, axis=0)
-        split = split_attitude(time_s, seen_by(ours, small, error), ours)
-        ratios.append((split.offset_deg - small) / split.offset_sigma_deg)
-    assert 0.3 < np.mean(np.square(ratios)) < 1.6
-
-
-def test_split_without_attitude_of_the_filter_says_nothing() -> None:
-    time_s, ours = attitudes(np.random.default_rng(3))
-    split = split_attitude(time_s, np.full_like(ours, np.nan), ours)
-    assert np.isnan(split.rest_deg).all() and np.isnan(split.offset_sigma_deg).all()
-    short = split_attitude(time_s[:50], ours[:50] + 1.0, ours[:50])  # five seconds prove no constant
-    assert (split.offset_deg == 0.0).all() and (short.offset_deg == 0.0).all()
-    assert short.rest_deg == pytest.approx(np.ones((50, 3)), abs=1e-9)

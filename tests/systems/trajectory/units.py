@@ -10,8 +10,11 @@ from numpy.typing import NDArray
 
 from groundstation.simulation.imu.families import Family
 from groundstation.simulation.imu.flight import ImuFlight, simulate_imu
-from groundstation.simulation.imu.settings import ImuSettings, MountingSettings
+from groundstation.simulation.imu.settings import ImuSettings, MountingSettings, ReceiverSettings
 from groundstation.systems.trajectory.axis_turns import axis_turns, signed_permutations
+from groundstation.systems.trajectory.gnss_input import gnss_of
+from groundstation.systems.trajectory.imu_input import imu_of
+from groundstation.systems.trajectory.input_settings import InputSettings
 from groundstation.systems.trajectory.inputs import GnssFixes, ImuIncrements
 from groundstation.tables.table import Flight
 from groundstation.tables.vehicle import VehicleKind
@@ -35,9 +38,17 @@ def simulated(
     duration_s: float = SHORT_S,
     imu_class: str = "mems",
     mounting: MountingSettings = MountingSettings(),  # noqa: B008 - frozen
+    *,
+    precise: bool = False,
 ) -> Pair:
-    """Unit and receiver of a simulated log."""
-    settings = ImuSettings(duration_s=duration_s, imu_class=imu_class, mounting=mounting)
+    """Unit and receiver of a simulated log; a precise one has positions to a centimetre."""
+    receiver = ReceiverSettings(position_white_m=0.01, position_slow_m=0.02, position_fast_m=0.01)
+    settings = ImuSettings(
+        duration_s=duration_s,
+        imu_class=imu_class,
+        mounting=mounting,
+        gnss=receiver if precise else ReceiverSettings(),
+    )
     return pair_of(simulate_imu(family, seed, settings=settings))
 
 
@@ -130,28 +141,4 @@ def _rtklib(path: Path) -> GnssFixes:
 
 def of_flight(flight: Flight) -> Pair:
     """Unit and receiver of a log that a reader knows."""
-    table, time_s = flight["imu"], flight.time_s("imu")
-    interval_s = np.diff(time_s, prepend=2.0 * time_s[0] - time_s[1])
-    if table.has("delta_angle_x_rad"):
-        angle, velocity = (
-            np.column_stack([table.values(f"{name}_{axis}_{unit}") for axis in "xyz"])
-            for name, unit in (("delta_angle", "rad"), ("delta_velocity", "mps"))
-        )
-        interval_s = table.values("interval_s")
-    else:
-        angle = np.deg2rad(np.column_stack([table.values(f"rate_{axis}_dps") for axis in "xyz"])) * interval_s[:, None]
-        velocity = np.column_stack([table.values(f"accel_{axis}_mps2") for axis in "xyz"]) * interval_s[:, None]
-    kept = np.isfinite(angle).all(axis=1) & np.isfinite(velocity).all(axis=1) & (interval_s > 0.0)
-    kept[1:] &= np.diff(time_s) > 0.0
-    imu = ImuIncrements(time_s[kept], interval_s[kept], angle[kept], velocity[kept], table.has("delta_angle_x_rad"))
-    gnss = flight["gnss"]
-    height = "altitude_ellipsoid_m" if gnss.has("altitude_ellipsoid_m") else "altitude_msl_m"
-    names = ("velocity_north_mps", "velocity_east_mps", "velocity_down_mps")
-    values = [gnss.values(one) if gnss.has(one) else np.zeros(len(gnss)) for one in names]
-    return imu, fixes(
-        flight.time_s("gnss"),
-        gnss.values("latitude_deg"),
-        gnss.values("longitude_deg"),
-        gnss.values(height),
-        np.column_stack(values),
-    )
+    return imu_of(flight, InputSettings()).imu, gnss_of(flight, (), InputSettings()).gnss
