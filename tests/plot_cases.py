@@ -195,6 +195,14 @@ def crowd() -> FlightResults:
 
 
 @cache
+def trajectory() -> FlightResults:
+    """A solution whose heading is ambiguous, beside a filter on board, with a gap of the unit."""
+    from tests.systems.trajectory.made_answers import drawn
+
+    return of_answers(drawn())
+
+
+@cache
 def at_rest() -> FlightResults:
     """An aircraft that did not move, in many modes, without a height on its approach."""
     results = landing()
@@ -288,6 +296,7 @@ CASES: dict[str, Callable[[], FlightResults]] = {
     "placement": placement,
     "session": session,
     "crowd": crowd,
+    "trajectory": trajectory,
     "at_rest": at_rest,
 }
 
@@ -298,7 +307,7 @@ def names_of(name: str, results: FlightResults) -> list[tuple[str, ...]]:
         known = (
             one
             for one in results.figure_names
-            if not one.startswith(("gnss_", "health_"))  # whose chapters draw them
+            if not one.startswith(("gnss_", "health_", "trajectory_"))  # whose chapters draw them
             and (found := results.figure_with_rows(one)) is not None
             and "time_s" in found.columns
             and columns_by_unit(found)

@@ -34,7 +34,7 @@ BY_HAND = {
 BY_RERUN = {  # spaces, maps, tensors, and what grows with time
     *("planning/session/tab", "planning/session/placement_tab", "planning/landing/tab", "landing/tab"),
     *("flight_space", "track", "cooperative/space_tab", "magnetic/field_tab"),
-    *("heading/distribution_tab", "inertial/forecast_tab"),
+    *("heading/distribution_tab", "inertial/forecast_tab", "trajectory/space_tab"),
 }
 # The same of the room itself: fleet, comparison, plan, session, and what all painters log with.
 ROOM_BY_HAND = {

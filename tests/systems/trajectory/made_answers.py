@@ -150,6 +150,15 @@ def gapped() -> BestTrajectory:
     return accepted(track(gap_s=(250.0, 290.0)))
 
 
+def drawn() -> BestTrajectory:
+    """Two minutes with every series that a figure may have."""
+    states = track(120.0, gap_s=(50.0, 55.0))
+    answer = accepted(states)
+    shown = next(one for one in answer.figures if isinstance(one, TrajectoryTrack))
+    other = track_figure(states, np.asarray(wrap_360(states.heading_deg + 155.0)))
+    return replace(answer, figures=tuple(other if one is shown else one for one in answer.figures))
+
+
 MADE = {
     "accepted": accepted,
     "doubtful": doubtful,
