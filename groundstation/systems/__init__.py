@@ -15,6 +15,7 @@ OURS = (  # in the order they are shown
     "groundstation.systems.heading.system",
     "groundstation.systems.inertial.system",
     "groundstation.systems.latency.system",
+    "groundstation.systems.trajectory.system",
     "groundstation.systems.magnetic.system",
     "groundstation.systems.landing.system",
     "groundstation.systems.health.system",

@@ -1,12 +1,12 @@
 """Estimate of a trajectory: start, latency, noise, slip, and the smoothed passes of one segment."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from groundstation.systems.trajectory import observations, slip, still
 from groundstation.systems.trajectory.fit import NUMBERS, Fit, Number, fit_model
+from groundstation.systems.trajectory.fix_motion import motion_of
 from groundstation.systems.trajectory.forward import run_forward
 from groundstation.systems.trajectory.inputs import GnssFixes, ImuIncrements
 from groundstation.systems.trajectory.model import Model, StartSigmas, gate
@@ -37,6 +37,7 @@ from groundstation.systems.trajectory.states import (
     LAT,
     LEV,
     MNT,
+    NO_SLIP,
     SG,
     SLOW,
     FloatArray,
@@ -130,7 +131,7 @@ class Estimate:
 def pose(imu: ImuIncrements, gnss: GnssFixes, *, may_stop: bool) -> Problem:
     """Return the problem of a segment at latency zero."""
     samples = fill_gaps(imu)
-    have = np.isfinite(gnss.latitude_deg) & np.isfinite(gnss.velocity_mps[:, :2]).all(axis=1)
+    have = np.isfinite(gnss.latitude_deg) & np.isfinite(motion_of(gnss)[:, :2]).all(axis=1)
     inside = have & (gnss.time_s >= samples.begin_s) & (gnss.time_s < samples.time_s[-1])
     begin_s = float(gnss.time_s[inside][0])
     middle, stands, rate = still.still_windows(samples, gnss, 0.0, may_stop=may_stop)
@@ -202,7 +203,7 @@ def heading_of(nav: FloatArray) -> float:
 
 
 def _first_motion_s(gnss: GnssFixes, begin_s: float) -> float:
-    speed = np.linalg.norm(np.nan_to_num(gnss.velocity_mps[:, :2]), axis=1)
+    speed = np.linalg.norm(np.nan_to_num(motion_of(gnss)[:, :2]), axis=1)
     moving = gnss.time_s[(speed > MOVES_MPS) & (gnss.time_s >= begin_s)]
     return float(moving[0]) if len(moving) else begin_s
 
@@ -233,8 +234,8 @@ def relinearised(problem: Problem, model: Model, rules: Gate, done: Pass, rounds
     A filter that is linearised about its own estimate thinks that it sees what it cannot: as the estimate moves, the
     combination of errors that no datum shows moves too.
 
-    Source: B. M. Bell, The iterated Kalman smoother as a Gauss-Newton method, SIAM J. Optimization 4, 1994; G. P. Huang,
-    A. I. Mourikis, S. I. Roumeliotis, Observability-based rules for consistent EKF SLAM, 2010.
+    Source: B. M. Bell, The iterated Kalman smoother as a Gauss-Newton method, SIAM J. Optimization 4, 1994;
+    G. P. Huang, A. I. Mourikis, S. I. Roumeliotis, Observability-based rules for consistent EKF SLAM, 2010.
     """
     plan, noise = problem.plan(model), problem.noise(model)
     for _ in range(rounds):
@@ -257,9 +258,6 @@ def fitted(problem: Problem, model: Model, rules: Gate, done: Pass, numbers: tup
     return fit_model(model, likelihood, numbers)
 
 
-Progress = Callable[[str], None]
-
-
 def estimate(
     imu: ImuIncrements,
     gnss: GnssFixes,
@@ -268,6 +266,8 @@ def estimate(
     may_stop: bool = True,
     prior: Model | None = None,
     fit: bool = True,
+    latency_s: float = 0.0,
+    lag_s: float = 0.0,
 ) -> Estimate:
     """Estimate the trajectory of one segment.
 
@@ -282,9 +282,11 @@ def estimate(
         Numbers of the class.
     fit : bool
         False: the numbers of ``prior`` as they are.
+    latency_s, lag_s : float
+        Where the search for the latencies begins.
     """
     model = Model() if prior is None else prior
-    problem = pose(imu, gnss, may_stop=may_stop)
+    problem = replace(pose(imu, gnss, may_stop=may_stop), latency_s=latency_s, lag_s=lag_s)
     open_gate, rules = gate(OPEN_SIGMAS), gate(CLOSED_SIGMAS)
     first = hypotheses_of(problem, model, open_gate)
     problem, start, done = settle(problem, model, open_gate, first[0].start, LATENCY_ROUNDS)
@@ -311,8 +313,13 @@ def estimate(
             model = found.model
             start, done = _at(problem, model, rules, problem.restarted(start, model))
     done = relinearised(problem, model, rules, done)
-    last = hypotheses_of(problem, model, rules)
+    last = hypotheses_of(_without_slip(problem), model, rules)
     return Estimate(problem, model, found, last, done, rules, travel)
+
+
+def _without_slip(problem: Problem) -> Problem:
+    """Return the problem without what was learned of the direction of travel: it would favour the heading it is of."""
+    return replace(problem, seen=problem.seen.take(problem.seen.kind != NO_SLIP), has_slip=False)
 
 
 def _at(problem: Problem, model: Model, rules: Gate, start: Start) -> tuple[Start, Pass]:

@@ -1,7 +1,9 @@
 """Fit of the model's numbers to a log: penalised likelihood, one number after the other.
 
-The likelihood is that of the filter's innovations (Schweppe 1965); each number has a prior about that of its class, wide
-in the logarithm, and bounds. Source: F. C. Schweppe, Evaluation of likelihood functions for Gaussian signals, IEEE
+The likelihood is that of the filter's innovations; each number has a prior about that of its class, wide in the
+logarithm, and bounds.
+
+Source: F. C. Schweppe, Evaluation of likelihood functions for Gaussian signals, IEEE
 Trans. Information Theory 11, 1965; R. K. Mehra, On the identification of variances and adaptive Kalman filtering, IEEE
 Trans. Automatic Control 15, 1970.
 """
@@ -12,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.systems.trajectory.model import Model
+from groundstation.systems.trajectory.states import FloatArray
 
 
 @dataclass(frozen=True)
@@ -31,8 +34,8 @@ NUMBERS = (
     Number("position_scale", 1.0, 0.02, 20.0),
     Number("slow_scale", 1.0, 0.05, 10.0),
     Number("fast_scale", 1.0, 0.02, 10.0),
-    Number("gyro_imperfection", 1.0, 0.03, 10.0),
-    Number("accel_imperfection", 1.0, 0.03, 10.0),
+    Number("gyro_imperfection", 0.5, 0.03, 2.5),
+    Number("accel_imperfection", 0.5, 0.03, 2.5),
     Number("jitter_s", 1.0, 0.1, 30.0),
     Number("gyro_walk_dps_rth", 1.0, 0.02, 30.0),
     Number("accel_walk_mg_rth", 1.0, 0.02, 30.0),
@@ -63,15 +66,15 @@ def fit_model(prior: Model, likelihood: Callable[[Model], float], numbers: tuple
     logs = np.zeros(len(numbers))
     count = 0
 
-    def model_of(at: np.ndarray) -> Model:
+    def model_of(at: FloatArray) -> Model:
         return prior.changed({one.name: float(np.exp(step)) for one, step in zip(numbers, at, strict=True)})
 
-    def value_of(at: np.ndarray) -> float:
+    def value_of(at: FloatArray) -> float:
         nonlocal count
         count += 1
         penalty = sum(0.5 * (step / one.spread) ** 2 for one, step in zip(numbers, at, strict=True))
         found = likelihood(model_of(at))
-        return (found if np.isfinite(found) else -1e300) - penalty
+        return float((found if np.isfinite(found) else -1e300) - penalty)
 
     best = value_of(logs)
     steps = np.full(len(numbers), FIRST_STEP)
@@ -92,11 +95,11 @@ def fit_model(prior: Model, likelihood: Callable[[Model], float], numbers: tuple
 
 
 def _along(
-    value_of: Callable[[np.ndarray], float], logs: np.ndarray, i: int, step: float, low: float, high: float, best: float
-) -> tuple[float, np.ndarray, bool]:
+    value_of: Callable[[FloatArray], float], logs: FloatArray, i: int, step: float, low: float, high: float, best: float
+) -> tuple[float, FloatArray, bool]:
     """Walk along one number while it gets better, then to the top of the parabola through the last three."""
 
-    def at(number: float) -> np.ndarray:
+    def at(number: float) -> FloatArray:
         moved = logs.copy()
         moved[i] = min(max(number, low), high)
         return moved

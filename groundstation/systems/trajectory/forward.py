@@ -69,7 +69,7 @@ def carry(e: int, first: int, last: int, imu: Imu, noise: Noise, now: Now, room:
     spent[e, 3] = 0.0
     keeps = linear.nav.shape[0] > 0
     for k in range(first, last):
-        mechanise(imu.interval_s[k], imu.angle, imu.velocity, k, value, nav, now.before, room.C, step)
+        mechanise(imu.interval_s, imu.angle, imu.velocity, k, value, nav, now.before, room.C, step)
         grow_transition(room.C, step, room.grown)
         for i in range(3):
             turn[i] += step[12 + i]
@@ -129,7 +129,7 @@ def predict(e: int, noise: Noise, pattern: Pattern, now: Now, room: Room, linear
 @inlined
 def _is_absent(at: int, m: int, i: int, seen: Seen, linear: Linear) -> bool:
     z, variance = linear.z[at], seen.variance[m, i]
-    return z == NO_ROW or z != z or variance != variance
+    return bool(z == NO_ROW or z != z or variance != variance)
 
 
 @in_place

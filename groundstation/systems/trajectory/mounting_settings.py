@@ -16,7 +16,7 @@ class MountingSettings:
     step_s: float = number(1.0, 0.2, 10.0)  # between the fixes whose change of velocity is compared
     steps: int = number(8, 4, 60)
     imu_step_s: float = number(0.05, 0.005, 0.5)
-    lag_max_s: float = number(1.0, 0.0, 5.0)  # GNSS against the unit
+    lag_max_s: float = number(1.5, 0.0, 5.0)  # GNSS against the unit
     lag_step_s: float = number(0.1, 0.01, 1.0)
     spans_max: int = number(60, 5, 1000)  # those with the most motion
     motion_min_mps2: float = number(0.25, 0.01, 20.0)  # RMS of the horizontal acceleration of a span

@@ -1,11 +1,13 @@
 """Observations of a pass in one list: GNSS, standstill, no slip, barometer."""
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.records import BoolArray, Int64Array, frozen
+from groundstation.systems.trajectory.fix_motion import motion_of
 from groundstation.systems.trajectory.inputs import GnssFixes
 from groundstation.systems.trajectory.states import POSITION, VELOCITY
 
@@ -44,7 +46,7 @@ class Observations:
     def __len__(self) -> int:
         return len(self.time_s)
 
-    def take(self, index: Int64Array | BoolArray) -> "Observations":
+    def take(self, index: Any) -> "Observations":
         """The measurements that ``index`` selects."""
         return Observations(*(getattr(self, item.name)[index] for item in fields(self)))
 
@@ -59,7 +61,7 @@ def joined(parts: list[Observations]) -> Observations:
 def of_gnss(gnss: GnssFixes) -> Observations:
     """Return positions and velocities with the variances that the receiver states."""
     position = np.stack([np.radians(gnss.latitude_deg), np.radians(gnss.longitude_deg), gnss.height_m], axis=1)
-    velocity = np.nan_to_num(gnss.velocity_mps)
+    velocity = np.nan_to_num(motion_of(gnss))
     kinds = np.repeat([POSITION, VELOCITY], len(gnss))
     everywhere = np.ones(2 * len(gnss), dtype=bool)
     found = Observations(

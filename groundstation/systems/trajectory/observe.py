@@ -99,7 +99,7 @@ def observe(m: int, seen: Seen, now: Now, room: Room) -> None:
             room.h[i, e] = 0.0
     back = seen.back_s[m]
     late = value[LAT]
-    if kind == POSITION or kind == VELOCITY:
+    if kind in (POSITION, VELOCITY):
         _arm(m, seen, now, room)
         for i in range(3):
             change = step[22 + i]

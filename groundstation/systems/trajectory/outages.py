@@ -64,7 +64,7 @@ class Outages:
 
     def of_length(self, length_s: float) -> BoolArray:
         """Tell which rows are of a length."""
-        return self.length_s == length_s
+        return np.asarray(self.length_s == length_s)
 
 
 def replay(estimate: Estimate, lengths_s: tuple[float, ...] = LENGTHS_S) -> Outages:
@@ -73,7 +73,8 @@ def replay(estimate: Estimate, lengths_s: tuple[float, ...] = LENGTHS_S) -> Outa
     for length_s in lengths_s:
         rows += _of_length(estimate, length_s)
     table = np.array(rows, dtype=np.float64).reshape(-1, 15)
-    return Outages(*(table[:, i] for i in range(6)), table[:, 6:9], table[:, 9:12], table[:, 12:15])
+    start, length, error, sigma, ratio, end = table[:, :6].T
+    return Outages(start, length, error, sigma, ratio, end, table[:, 6:9], table[:, 9:12], table[:, 12:15])
 
 
 def _of_length(estimate: Estimate, length_s: float) -> list[tuple[float, ...]]:
@@ -114,7 +115,7 @@ def hidden(plan: Plan, windows: FloatArray) -> BoolArray:
     valid_s = _valid_s(plan)
     at = np.searchsorted(windows[:, 0], valid_s, side="right") - 1
     inside = (at >= 0) & (valid_s < windows[np.maximum(at, 0), 1])
-    return inside & np.isin(plan.seen.kind, (POSITION, VELOCITY, STILL, NO_RATE))
+    return np.asarray(inside & np.isin(plan.seen.kind, (POSITION, VELOCITY, STILL, NO_RATE)))
 
 
 def without(estimate: Estimate, windows: FloatArray) -> Pass:

@@ -187,7 +187,9 @@ def all_kept(plan: Plan) -> Solved:
     epochs, scalars = len(plan.epoch_s), 3 * len(plan.seen.kind)
     return Solved(
         np.empty((epochs, KEPT_ROWS, STATES)),
-        *(np.empty((epochs, STATES)) for _ in range(3)),
+        np.empty((epochs, STATES)),
+        np.empty((epochs, STATES)),
+        np.empty((epochs, STATES)),
         np.empty((scalars, STATES)),
         np.empty(scalars),
         np.ones(scalars),

@@ -48,7 +48,7 @@ def turn_rate_dps(track: TrackOfStates) -> FloatArray:
     if len(track) < 2:
         return np.zeros(len(track))
     heading = np.unwrap(np.radians(track.heading_deg))
-    return np.degrees(np.gradient(heading, track.time_s))
+    return np.asarray(np.degrees(np.gradient(heading, track.time_s)))
 
 
 def direction_of_travel(track: TrackOfStates) -> Travel:
@@ -65,7 +65,8 @@ def direction_of_travel(track: TrackOfStates) -> Travel:
     sideways = unit @ np.array([-np.sin(yaw), np.cos(yaw), 0.0])
     upward = unit @ np.array([np.sin(pitch) * np.cos(yaw), np.sin(pitch) * np.sin(yaw), np.cos(pitch)])
     scatter = [1.4826 * float(np.median(np.abs(one - np.median(one)))) for one in (sideways, upward)]
-    return Travel(float(yaw), float(pitch), *np.degrees(scatter).tolist(), int(seconds))
+    yaw_deg, pitch_deg = np.degrees(scatter).tolist()
+    return Travel(float(yaw), float(pitch), yaw_deg, pitch_deg, int(seconds))
 
 
 def observations_of(track: TrackOfStates) -> Observations:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from groundstation.systems.trajectory.fix_motion import motion_of
 from groundstation.systems.trajectory.inputs import GnssFixes
 from groundstation.systems.trajectory.model import DEG, StartSigmas
 from groundstation.systems.trajectory.passes import Samples, Start
@@ -27,7 +28,7 @@ def quaternion_of(C: FloatArray) -> FloatArray:
         q = np.array([(C[0, 2] - C[2, 0]) / 4 / y, (C[0, 1] + C[1, 0]) / 4 / y, y, (C[1, 2] + C[2, 1]) / 4 / y])
     else:
         q = np.array([(C[1, 0] - C[0, 1]) / 4 / z, (C[0, 2] + C[2, 0]) / 4 / z, (C[1, 2] + C[2, 1]) / 4 / z, z])
-    return q / np.linalg.norm(q)
+    return np.asarray(q / np.linalg.norm(q))
 
 
 def level(force: FloatArray, heading_rad: float, acceleration: FloatArray) -> FloatArray:
@@ -71,11 +72,12 @@ def starts_at(
     count: int = HYPOTHESES,
 ) -> list[Start]:
     """Return a start for each heading hypothesis at ``begin_s``."""
-    have = np.isfinite(gnss.latitude_deg) & np.isfinite(gnss.velocity_mps[:, :2]).all(axis=1)
+    motion = motion_of(gnss)
+    have = np.isfinite(gnss.latitude_deg) & np.isfinite(motion[:, :2]).all(axis=1)
     fixes = np.flatnonzero(have)
     valid_s = gnss.time_s - latency_s
     at = int(fixes[np.argmin(np.abs(valid_s[fixes] - begin_s))])
-    velocity = np.nan_to_num(gnss.velocity_mps[at])
+    velocity = motion[at]
     near = samples.time_s - begin_s
     window = np.flatnonzero((near > 0.0) & (near <= LEVEL_S))
     if not len(window):
@@ -86,7 +88,7 @@ def starts_at(
         beside = fixes[np.abs(valid_s[fixes] - begin_s) <= max(2.5, 1.5 * float(np.median(np.diff(valid_s[fixes]))))]
         if len(beside) >= 2:
             t = valid_s[beside] - begin_s
-            acceleration = np.polyfit(t, np.nan_to_num(gnss.velocity_mps[beside]), 1)[0]
+            acceleration = np.polyfit(t, motion[beside], 1)[0]
     p = np.diag(variances)
     sigma_m = np.nan_to_num(gnss.position_sigma_m[at], nan=10.0)
     sigma_mps = np.nan_to_num(gnss.velocity_sigma_mps[at], nan=0.5)

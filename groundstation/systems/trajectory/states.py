@@ -135,7 +135,10 @@ class Room(NamedTuple):
 
 
 class Line(NamedTuple):
-    """Trajectory that a pass is linearised about, at the end of each epoch; no rows: about the filter's own estimate."""
+    """Trajectory that a pass is linearised about, at the end of each epoch.
+
+    Without rows it is the filter's own estimate.
+    """
 
     nav: FloatArray  # (e or 0, 10)
     value: FloatArray  # (e or 0, STATES)

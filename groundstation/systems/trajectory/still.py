@@ -3,6 +3,7 @@
 import numpy as np
 
 from groundstation.base.records import BoolArray
+from groundstation.systems.trajectory.fix_motion import motion_of
 from groundstation.systems.trajectory.inputs import GnssFixes
 from groundstation.systems.trajectory.observations import Observations
 from groundstation.systems.trajectory.passes import Samples
@@ -44,8 +45,9 @@ def still_windows(
         its last motion alone: a hover is quiet too.
     """
     middle, rate, shakes, jolts = windows_of(samples)
-    speed = np.linalg.norm(np.nan_to_num(gnss.velocity_mps[:, :2]), axis=1)
-    known = np.isfinite(gnss.velocity_mps[:, :2]).all(axis=1)
+    motion = motion_of(gnss)
+    speed = np.linalg.norm(np.nan_to_num(motion[:, :2]), axis=1)
+    known = np.isfinite(motion[:, :2]).all(axis=1)
     moving = (
         np.interp(middle, gnss.time_s[known] - latency_s, speed[known]) if known.any() else np.full(len(middle), np.inf)
     )

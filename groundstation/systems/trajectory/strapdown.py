@@ -12,21 +12,18 @@ import math
 
 from groundstation.base.compile import inlined
 from groundstation.base.geodesy import EARTH_RATE_RADPS, ECCENTRICITY_SQUARED, FLATTENING, SEMI_MAJOR_M
+from groundstation.base.gravity import GEODETIC_RATIO, GRAVITY_EQUATOR_MPS2, SOMIGLIANA
 from groundstation.systems.trajectory.states import ATT, BA, BG, LEV, MA, MG, SA, SG, FloatArray
-
-EQUATOR_MPS2 = 9.7803253359
-SOMIGLIANA = 0.00193185265241
-ROTATION_RATIO = 0.00344978650684  # of centrifugal and gravity acceleration at the equator
 
 
 @inlined
 def normal_gravity(sine: float, height_m: float) -> float:
     """Return normal gravity on WGS 84, m/s2, from the sine of the latitude and the height."""
     squared = sine * sine
-    surface = EQUATOR_MPS2 * (1.0 + SOMIGLIANA * squared) / math.sqrt(1.0 - ECCENTRICITY_SQUARED * squared)
+    surface = GRAVITY_EQUATOR_MPS2 * (1.0 + SOMIGLIANA * squared) / math.sqrt(1.0 - ECCENTRICITY_SQUARED * squared)
     ratio = height_m / SEMI_MAJOR_M
     return surface * (
-        1.0 - 2.0 * (1.0 + FLATTENING + ROTATION_RATIO - 2.0 * FLATTENING * squared) * ratio + 3.0 * ratio * ratio
+        1.0 - 2.0 * (1.0 + FLATTENING + GEODETIC_RATIO - 2.0 * FLATTENING * squared) * ratio + 3.0 * ratio * ratio
     )
 
 
@@ -79,7 +76,7 @@ def turn_after(nav: FloatArray, x: float, y: float, z: float) -> None:
 
 @inlined
 def mechanise(
-    dt: float,
+    interval_s: FloatArray,
     angle: FloatArray,
     velocity: FloatArray,
     k: int,
@@ -94,6 +91,7 @@ def mechanise(
     Fills ``C`` with the attitude at its start, and ``step``: 0-2 angle increments as read, 3-5 corrected, 6-8 velocity
     increments in n, 9-11 velocity before, 12-14 turn of n, 15 interval, 16-18 velocity increments as read.
     """
+    dt = interval_s[k]
     x, y, z = angle[k, 0], angle[k, 1], angle[k, 2]
     ax = x - value[BG] * dt - value[SG] * x - value[MG] * y - value[MG + 1] * z
     ay = y - value[BG + 1] * dt - value[SG + 1] * y - value[MG + 2] * x - value[MG + 3] * z
@@ -108,6 +106,15 @@ def mechanise(
         ratio = dt / before[6] / 12.0
     bx, by, bz = ratio * before[0], ratio * before[1], ratio * before[2]
     cx, cy, cz = ratio * before[3], ratio * before[4], ratio * before[5]
+    if ratio > 0.0 and k + 1 < len(interval_s) and 0.5 * dt < interval_s[k + 1] < 2.0 * dt:
+        # of the increments before and behind: the error is of the fifth order, and biases cancel
+        one = 0.5 * dt / interval_s[k + 1] / 12.0
+        bx = 0.5 * bx - one * (angle[k + 1, 0] + ax - x)
+        by = 0.5 * by - one * (angle[k + 1, 1] + ay - y)
+        bz = 0.5 * bz - one * (angle[k + 1, 2] + az - z)
+        cx = 0.5 * cx - one * (velocity[k + 1, 0] + ux - u)
+        cy = 0.5 * cy - one * (velocity[k + 1, 1] + uy - v)
+        cz = 0.5 * cz - one * (velocity[k + 1, 2] + uz - w)
     # rotation vector with coning; velocity with rotation and sculling
     rx = ax + (by * az - bz * ay)
     ry = ay + (bz * ax - bx * az)
@@ -115,6 +122,11 @@ def mechanise(
     sx = ux + 0.5 * (ay * uz - az * uy) + (by * uz - bz * uy) + (cy * az - cz * ay)
     sy = uy + 0.5 * (az * ux - ax * uz) + (bz * ux - bx * uz) + (cz * ax - cx * az)
     sz = uz + 0.5 * (ax * uy - ay * ux) + (bx * uy - by * ux) + (cx * ay - cy * ax)
+    # third order of the rotation: a x (a x u) / 6
+    qx, qy, qz = ay * uz - az * uy, az * ux - ax * uz, ax * uy - ay * ux
+    sx += (ay * qz - az * qy) / 6.0
+    sy += (az * qx - ax * qz) / 6.0
+    sz += (ax * qy - ay * qx) / 6.0
     before[0], before[1], before[2], before[3], before[4], before[5], before[6] = ax, ay, az, ux, uy, uz, dt
     rotation_of(nav, C)
     fn = C[0, 0] * sx + C[0, 1] * sy + C[0, 2] * sz
@@ -252,7 +264,7 @@ def finish_transition(nav: FloatArray, time_s: float, turn: FloatArray, grown: F
     grown[4, 5] += an
     grown[5, 3] += we
     grown[5, 4] -= an
-    grown[5, 2] += 2.0 * EQUATOR_MPS2 / radius * time_s
+    grown[5, 2] += 2.0 * GRAVITY_EQUATOR_MPS2 / radius * time_s
     # attitude: the frame turns, and turns wrongly with a wrong velocity
     grown[6, 7] += wd
     grown[6, 8] -= we

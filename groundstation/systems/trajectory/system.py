@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from groundstation.systems.system import System, Tab
+from groundstation.systems.trajectory.analysis import TRAJECTORY
 
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Chapter
@@ -30,4 +31,4 @@ def _tabs() -> tuple[Tab, ...]:
     return (Tab(("trajectory",), trajectory),)
 
 
-SYSTEM = System(name="trajectory", chapters=_chapters, plots=_plots, tabs=_tabs)
+SYSTEM = System(name="trajectory", analyses=(TRAJECTORY,), chapters=_chapters, plots=_plots, tabs=_tabs)

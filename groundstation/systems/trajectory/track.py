@@ -98,7 +98,7 @@ def _attitude_sigma(pitch: FloatArray, heading: FloatArray, variance: FloatArray
     along, across = c * variance[:, 0] + s * variance[:, 1], s * variance[:, 0] + c * variance[:, 1]
     level = np.maximum(np.cos(pitch), LEAST_LEVEL)
     roll = along / level**2
-    return np.sqrt(np.stack([roll, across, variance[:, 2] + np.tan(np.arccos(level)) ** 2 * along], axis=1))
+    return np.asarray(np.sqrt(np.stack([roll, across, variance[:, 2] + np.tan(np.arccos(level)) ** 2 * along], axis=1)))
 
 
 def joined(parts: list[TrackOfStates]) -> TrackOfStates:

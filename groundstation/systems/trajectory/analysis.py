@@ -1,0 +1,45 @@
+"""Best trajectory as an analysis: of every log with an inertial unit."""
+
+from typing import TYPE_CHECKING
+
+from groundstation.base.signals import topics_of_kind
+from groundstation.results.answer import Answers, answer_of
+from groundstation.systems.analysis import Analysis, Found
+from groundstation.systems.known import Known
+from groundstation.systems.trajectory.answer import BestTrajectory
+from groundstation.systems.trajectory.settings import TrajectorySettings
+
+if TYPE_CHECKING:
+    from groundstation.tables.table import Flight
+
+
+def _run(flight: "Flight", known: Known, settings: TrajectorySettings) -> Found[BestTrajectory]:
+    from groundstation.systems.trajectory.solve import solve
+
+    answer, findings, workings = solve(flight, known, settings)
+    return Found(answer, findings, workings)
+
+
+def _has_unit(flight: "Flight", _known: Known) -> bool:
+    return bool(topics_of_kind("imu", flight.topics()))
+
+
+def _sentence(answers: Answers) -> str:
+    from groundstation.systems.trajectory.wording_answer import sentence_of
+
+    answer = answer_of(answers, BestTrajectory)
+    return "" if answer is None else sentence_of(answer)
+
+
+TRAJECTORY = Analysis(
+    name="trajectory",
+    title="best trajectory: raw inertial data and GNSS, smoothed, with the errors of the on-board filter",
+    subject="trajectory",
+    page_title="Best trajectory",
+    needs="an inertial unit's increments or samples (topic imu) with GNSS position and velocity; a minute of motion",
+    settings=TrajectorySettings,
+    answer=BestTrajectory,
+    run=_run,
+    applies=_has_unit,
+    sentence=_sentence,
+)

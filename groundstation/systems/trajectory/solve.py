@@ -1,0 +1,326 @@
+"""Best trajectory of a flight: input, mounting, estimate, honesty gate, answer."""
+
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from groundstation.base.errors import NotAssessableError
+from groundstation.base.findings import Finding
+from groundstation.results.gates import Gate, judged_gate
+from groundstation.systems.known import Known
+from groundstation.systems.trajectory import checks, figures, judge, tell
+from groundstation.systems.trajectory.answer import (
+    BestTrajectory,
+    HeadingHypothesis,
+    InnovationRow,
+    TrajectoryState,
+    UnitMounting,
+)
+from groundstation.systems.trajectory.estimate import Estimate
+from groundstation.systems.trajectory.gather import gather
+from groundstation.systems.trajectory.gathered import Gathered
+from groundstation.systems.trajectory.inputs import ImuIncrements
+from groundstation.systems.trajectory.mounting import Mounting, find_mounting
+from groundstation.systems.trajectory.mounting_logged import logged_mounting
+from groundstation.systems.trajectory.onboard import ComparedFilter, compare_onboard
+from groundstation.systems.trajectory.outages import Outages, replay
+from groundstation.systems.trajectory.segments import SUBJECT, Segment, estimate_segments, moving_s
+from groundstation.systems.trajectory.settings import TrajectorySettings
+from groundstation.systems.trajectory.solution import FloatArray, TrackOfStates
+from groundstation.systems.trajectory.track import forward_track, joined, smoothed_track
+
+if TYPE_CHECKING:
+    from groundstation.tables.table import Flight
+
+COARSE_LAG_S = 0.15  # a coarse latency that is smaller is left to the filter
+INS = "ins"
+
+
+@dataclass(frozen=True)
+class Solved:
+    """States of the smoother and of the filter, sigmas raised, for the analyses behind this one."""
+
+    smoothed: TrackOfStates
+    forward: TrackOfStates
+    state: TrajectoryState
+
+
+def solve(
+    flight: "Flight", known: Known, settings: TrajectorySettings
+) -> tuple[BestTrajectory, tuple[Finding, ...], Solved]:
+    """Estimate the best trajectory of a flight.
+
+    Raises
+    ------
+    NotAssessableError
+        With the reason: no input, axes that cannot be right, too little motion, samples too slow, innovations far from
+        what is expected, a heading that nothing shows.
+    """
+    gathered = gather(flight, known, settings.input)
+    vehicle = known.phases.vehicle.kind
+    mounting = _mounting(flight, known, gathered, settings)
+    _enough(gathered, settings)
+    imu = turned(gathered.imu, mounting.body_from_case)
+    lag_s = mounting.evidence.lag_s
+    segments = estimate_segments(
+        imu,
+        gathered.gnss,
+        gap_s=settings.input.segment_s,
+        least_s=settings.segment_min_s,
+        may_roll=vehicle == "rolls",
+        may_stop=vehicle in ("rolls", "walks"),
+        latency_s=lag_s if np.isfinite(lag_s) and abs(lag_s) > COARSE_LAG_S else 0.0,
+    )
+    return _answered(flight, gathered, mounting, segments, settings, vehicle or "")
+
+
+def _mounting(flight: "Flight", known: Known, gathered: Gathered, settings: TrajectorySettings) -> Mounting:
+    mounting = find_mounting(
+        gathered.imu,
+        gathered.gnss,
+        vehicle=known.phases.vehicle.kind,
+        stated=known.aircraft.imu_mounting_deg,
+        logged=logged_mounting(flight),
+        settings=settings.mounting,
+    )
+    if mounting.refused:
+        raise NotAssessableError(SUBJECT, f"{gathered.imu_facts.topic}: {mounting.refused}")
+    return mounting
+
+
+def turned(imu: ImuIncrements, body_from_case: FloatArray) -> ImuIncrements:
+    """Return increments along the axes of the body."""
+    return replace(
+        imu,
+        delta_angle_rad=imu.delta_angle_rad @ body_from_case.T,
+        delta_velocity_mps=imu.delta_velocity_mps @ body_from_case.T,
+    )
+
+
+def _enough(gathered: Gathered, settings: TrajectorySettings) -> None:
+    """Refuse a log with too little motion, or samples too slow for it."""
+    start_s, end_s = float(gathered.imu.time_s[0]), float(gathered.imu.time_s[-1])
+    motion_s = moving_s(gathered.gnss, start_s, end_s, settings.moving_mps)
+    if motion_s < settings.moving_min_s:
+        raise NotAssessableError(
+            SUBJECT, f"{motion_s:.0f} s of motion, at least {settings.moving_min_s:.0f} s are needed"
+        )
+    facts = gathered.imu_facts
+    if not facts.is_integral and facts.rate_hz < settings.sample_rate_min_hz:
+        raise NotAssessableError(
+            SUBJECT,
+            f"{facts.topic} has point samples of {facts.rate_hz:.0f} Hz: what happens between them is not in the log; "
+            f"at least {settings.sample_rate_min_hz:.0f} Hz are needed, or increments",
+        )
+
+
+def _answered(
+    flight: "Flight",
+    gathered: Gathered,
+    mounting: Mounting,
+    segments: tuple[Segment, ...],
+    settings: TrajectorySettings,
+    vehicle: str,
+) -> tuple[BestTrajectory, tuple[Finding, ...], Solved]:
+    estimates = tuple(one.estimate for one in segments)
+    main = max(estimates, key=lambda one: len(one.result.plan.epoch_s))
+    innovations = checks.innovations_of(main)
+    _fits(innovations, main, settings)
+    outages = _joined([replay(one) for one in estimates])
+    plain = joined([smoothed_track(one.problem.samples, one.result, segment=i) for i, one in enumerate(estimates)])
+    own = checks.against_own_track(plain) if main.problem.has_slip else None
+    moving = _moving(plain, settings)
+    sigma_deg = float(np.median(plain.attitude_sigma_deg[moving, 2]))
+    factors, raised = judge.raised(outages, own, sigma_deg, rolls=main.problem.has_slip)
+    smoothed = judge.with_factors(plain, factors)
+    forward = judge.with_factors(
+        joined([forward_track(one.problem.samples, one.result, segment=i) for i, one in enumerate(estimates)]), factors
+    )
+    sigma_deg *= factors.heading
+    hypotheses = _hypotheses(main)
+    if sigma_deg > settings.heading_sigma_max_deg and not _are_two(hypotheses, settings):
+        raise NotAssessableError(
+            SUBJECT,
+            f"heading to {sigma_deg:.1f} deg (sigma) alone, limit {settings.heading_sigma_max_deg:g}: the motion does "
+            "not show it",
+        )
+    gates = _gates(innovations, sigma_deg, factors, settings)
+    state, reasons = _state(gathered, mounting, main, hypotheses, gates, outages, factors, settings)
+    separation, separation_figure = figures.separation_of(forward, smoothed)
+    compared = _onboard(smoothed, flight)
+    other = _other_heading(smoothed, hypotheses) if state == "ambiguous" else None
+    answer = BestTrajectory(
+        state=state,
+        reasons=reasons,
+        imu=gathered.imu_facts.topic,
+        gnss=gathered.gnss_facts.topic,
+        is_integral=gathered.imu_facts.is_integral,
+        imu_rate_hz=gathered.imu_facts.rate_hz,
+        vehicle=vehicle,
+        segments=figures.segments_of(smoothed),
+        moving_s=moving_s(gathered.gnss, smoothed.time_s[0], smoothed.time_s[-1], settings.moving_mps),
+        mounting=_told(mounting),
+        accuracy=figures.accuracy_of(smoothed),
+        gates=gates,
+        raised=raised,
+        noise=tell.noise_rows(main),
+        parameters=tell.parameter_rows(main),
+        innovations=innovations,
+        held_out=checks.held_out(main),
+        own_track=own,
+        outages=judge.outage_rows(outages, factors.position),
+        outage_truth="RTK" if gathered.gnss_facts.precise_share > 0.9 else "undisturbed solution",
+        hypotheses=hypotheses,
+        onboard=None if compared is None else compared.errors,
+        separation=separation,
+        settings=asdict(settings),
+        figures=(
+            figures.track_figure(smoothed, other),
+            separation_figure,
+            *(() if compared is None else (compared.figure,)),
+            tell.residuals_of(estimates),
+            tell.biases_of(estimates),
+            tell.outages_of(outages, factors.position),
+        ),
+    )
+    return answer, _findings(gathered, answer), Solved(smoothed, forward, state)
+
+
+def _joined(parts: list[Outages]) -> Outages:
+    return Outages(*(np.concatenate([getattr(part, name) for part in parts]) for name in Outages.__dataclass_fields__))
+
+
+def _moving(track: TrackOfStates, settings: TrajectorySettings) -> FloatArray:
+    moving = np.linalg.norm(track.velocity_mps[:, :2], axis=1) > settings.moving_mps
+    return moving if moving.any() else np.ones(len(track), dtype=bool)
+
+
+def _fits(innovations: tuple[InnovationRow, ...], main: Estimate, settings: TrajectorySettings) -> None:
+    """Refuse an estimate whose innovations are far larger than any noise explains."""
+    for row in innovations:
+        if row.ratio > settings.nis_max or not np.isfinite(row.ratio):
+            raise NotAssessableError(
+                SUBJECT,
+                f"innovations of {row.sensor} are {row.ratio:.1f} times what is expected after the noise was fitted, "
+                f"limit {settings.nis_max:g}: unit and GNSS do not go together",
+            )
+    share = checks.used_share(main)
+    if share < 0.5:
+        raise NotAssessableError(SUBJECT, f"only {share:.0%} of GNSS agrees with the unit: they do not go together")
+
+
+def _hypotheses(main: Estimate) -> tuple[HeadingHypothesis, ...]:
+    best = main.hypotheses[0].likelihood
+    return tuple(
+        HeadingHypothesis(one.start_heading_deg, one.end_heading_deg, max(0.0, best - one.likelihood))
+        for one in main.hypotheses
+    )
+
+
+def _are_two(hypotheses: tuple[HeadingHypothesis, ...], settings: TrajectorySettings) -> bool:
+    """Tell whether a second heading explains the log nearly as well."""
+    return len(hypotheses) > 1 and hypotheses[1].below_best < settings.ambiguous_below
+
+
+def _other_heading(track: TrackOfStates, hypotheses: tuple[HeadingHypothesis, ...]) -> FloatArray:
+    """Return the heading of the runner-up: the best one turned by the difference at the end."""
+    turn = hypotheses[1].end_heading_deg - hypotheses[0].end_heading_deg
+    return np.asarray((track.heading_deg + turn) % 360.0)
+
+
+def _gates(
+    innovations: tuple[InnovationRow, ...], sigma_deg: float, factors: judge.Factors, settings: TrajectorySettings
+) -> tuple[Gate, ...]:
+    """Return the checks that the state rests on."""
+    gates = [
+        judged_gate(
+            settings.nis_doubt,
+            f"nis_{row.sensor.replace(' ', '_').lower()}",
+            f"innovations of {row.sensor}, beside what is expected,",
+            row.ratio,
+        )
+        for row in innovations
+        if row.sensor.startswith("GNSS")
+    ]
+    gates.append(
+        judged_gate(
+            (None, settings.heading_sigma_max_deg), "heading_sigma", "sigma of the heading", sigma_deg, unit="deg"
+        )
+    )
+    for name in ("position", "velocity", "tilt", "heading"):
+        bound = (None, settings.raised_doubt)
+        gates.append(judged_gate(bound, f"raised_{name}", f"factor on sigmas of {name}", getattr(factors, name)))
+    return tuple(gates)
+
+
+def _state(
+    gathered: Gathered,
+    mounting: Mounting,
+    main: Estimate,
+    hypotheses: tuple[HeadingHypothesis, ...],
+    gates: tuple[Gate, ...],
+    outages: Outages,
+    factors: judge.Factors,
+    settings: TrajectorySettings,
+) -> tuple[TrajectoryState, tuple[str, ...]]:
+    """Return the state, and why it is not accepted."""
+    reasons = [
+        f"{gate.title} {gate.value:.2g}{' ' + gate.unit if gate.unit else ''}, limit {_limit(gate)}"
+        for gate in gates
+        if gate.state == "failed" and gate.value is not None
+    ]
+    facts = gathered.imu_facts
+    if not facts.is_integral and facts.rate_hz < settings.sample_rate_doubt_hz:
+        reasons.append(
+            f"point samples of {facts.rate_hz:.0f} Hz: vibration and motion between them are not in the log, limit "
+            f"{settings.sample_rate_doubt_hz:g} Hz"
+        )
+    share = checks.used_share(main)
+    if share < settings.used_share_min:
+        reasons.append(f"{share:.0%} of GNSS agrees with the unit, limit {settings.used_share_min:.0%}")
+    if abs(main.latency_s) > settings.latency_doubt_s:
+        reasons.append(f"GNSS latency of {main.latency_s:.2f} s, limit {settings.latency_doubt_s:g} s")
+    if len(outages) < judge.FEW:
+        reasons.append(f"only {len(outages)} outages could be replayed: nothing shows whether the sigmas hold")
+    reasons += [note.text for note in gathered.notes if note.is_doubt]
+    if mounting.doubt:
+        reasons.append(mounting.doubt)
+    if _are_two(hypotheses, settings):
+        one, two = hypotheses[:2]
+        first = (
+            f"a heading of {two.end_heading_deg:.0f} deg at the end is only {two.below_best:.1f} log units below the "
+            f"best one of {one.end_heading_deg:.0f} deg, limit {settings.ambiguous_below:g}"
+        )
+        return "ambiguous", (first, *reasons)
+    return ("doubtful" if reasons else "accepted"), tuple(reasons)
+
+
+def _limit(gate: Gate) -> str:
+    return " to ".join(f"{one:g}" for one in np.atleast_1d(gate.limit))
+
+
+def _told(mounting: Mounting) -> UnitMounting:
+    from groundstation.systems.trajectory.axis_turns import angles_of
+
+    roll, pitch, yaw = (float(one) for one in angles_of(mounting.body_from_case))
+    source = "case" if mounting.source == "refused" else mounting.source
+    return UnitMounting(source, mounting.words, roll, pitch, yaw)
+
+
+def _onboard(smoothed: TrackOfStates, flight: "Flight") -> ComparedFilter | None:
+    """Compare the filter that the vehicle flies by, where its log has one."""
+    topics = [topic for topic in flight.topics() if topic == INS or topic.startswith(f"{INS}.")]
+    for topic in sorted(topics):
+        found = compare_onboard(smoothed, flight, topic)
+        if found is not None:
+            return found
+    return None
+
+
+def _findings(gathered: Gathered, answer: BestTrajectory) -> tuple[Finding, ...]:
+    """Return what the input showed."""
+    return tuple(
+        Finding("warn" if note.is_doubt else "info", f"trajectory.{note.code}", note.text, gathered.imu_facts.topic)
+        for note in gathered.notes
+    ) + tuple(Finding("warn", f"trajectory.{answer.state}", reason, answer.imu) for reason in answer.reasons[:1])

@@ -1,0 +1,186 @@
+"""Rows and arrays of the answer from the estimates of its segments."""
+
+import numpy as np
+
+from groundstation.systems.trajectory.answer import NoiseRow, TrajectoryParameter
+from groundstation.systems.trajectory.arrays import TrajectoryBiases, TrajectoryOutages, TrajectoryResiduals
+from groundstation.systems.trajectory.estimate import Estimate
+from groundstation.systems.trajectory.figures import rows_shown
+from groundstation.systems.trajectory.model import DEG, STANDARD_GRAVITY_MPS2, Model
+from groundstation.systems.trajectory.observe import NO_ROW
+from groundstation.systems.trajectory.outages import Outages
+from groundstation.systems.trajectory.solution import FloatArray
+from groundstation.systems.trajectory.states import (
+    BA,
+    BG,
+    KEPT_ROWS,
+    LAG,
+    LAT,
+    LEV,
+    MA,
+    MG,
+    MISALIGNED,
+    MNT,
+    POSITION,
+    SA,
+    SG,
+    STATES,
+    VELOCITY,
+)
+
+OBSERVABLE = 0.6  # of the sigma at the start: what keeps more of it was not seen
+MG_PER = 1e-3 * STANDARD_GRAVITY_MPS2
+NOISES = (
+    ("gyro_noise_deg_rth", "gyro noise", "deg/sqrt(h)"),
+    ("accel_noise_mps_rth", "accelerometer noise", "m/s/sqrt(h)"),
+    ("gyro_walk_dps_rth", "walk of the gyro bias", "deg/s/sqrt(h)"),
+    ("accel_walk_mg_rth", "walk of the accelerometer bias", "mg/sqrt(h)"),
+    ("gyro_imperfection", "scale and misalignment of the gyro, beside 0.5 % and 0.3 deg", ""),
+    ("accel_imperfection", "scale and misalignment of the accelerometer, beside 0.5 % and 0.3 deg", ""),
+    ("position_scale", "white error of GNSS position, beside the stated sigma", ""),
+    ("slow_scale", "slow error of GNSS position (300 s), beside the stated sigma", ""),
+    ("fast_scale", "fast error of GNSS position (10 s), beside the stated sigma", ""),
+    ("velocity_scale", "error of GNSS velocity, beside the stated sigma", ""),
+    ("jitter_s", "jitter of the stamps of GNSS", "s"),
+    ("slip_mps", "sideways motion of what rolls", "m/s"),
+)
+
+
+def noise_rows(estimate: Estimate) -> tuple[NoiseRow, ...]:
+    """Return the numbers of the model: prior, fitted, whether at a bound."""
+    prior = Model()
+    names = [one for one in NOISES if one[0] != "slip_mps" or estimate.problem.has_slip]
+    return tuple(
+        NoiseRow(
+            words,
+            unit,
+            float(getattr(prior, name)),
+            float(getattr(estimate.model, name)),
+            name in estimate.fit.at_bound,
+        )
+        for name, words, unit in names
+    )
+
+
+def parameter_rows(estimate: Estimate) -> tuple[TrajectoryParameter, ...]:
+    """Return the constants that the log shows, and the biases at its end."""
+    value = estimate.result.constants
+    sigma, start = np.sqrt(estimate.result.constants_variance), np.sqrt(estimate.problem.variances(estimate.model))
+    axes, body = "xyz", ("forward", "right", "down")
+    rows = []
+
+    def put(at: int, name: str, group: str, unit: str, per: float, offset: float = 0.0) -> None:
+        if start[at] > 0.0:
+            numbers = (float(value[at]) / per + offset, float(sigma[at]) / per, float(start[at]) / per)
+            rows.append(TrajectoryParameter(name, group, unit, *numbers, bool(sigma[at] < OBSERVABLE * start[at])))
+
+    for i, axis in enumerate(axes):
+        put(BG + i, f"gyro bias {axis}", "gyro bias", "deg/s", DEG)
+    for i, axis in enumerate(axes):
+        put(BA + i, f"accelerometer bias {axis}", "accelerometer bias", "mg", MG_PER)
+    for i, axis in enumerate(axes):
+        put(SG + i, f"gyro scale {axis}", "gyro scale", "%", 0.01)
+    for i, axis in enumerate(axes):
+        put(SA + i, f"accelerometer scale {axis}", "accelerometer scale", "%", 0.01)
+    for i, (reads, turns) in enumerate(MISALIGNED):
+        put(MG + i, f"gyro misalignment {axes[reads]}{axes[turns]}", "gyro misalignment", "deg", DEG)
+    for i, (reads, turns) in enumerate(MISALIGNED):
+        put(MA + i, f"accelerometer misalignment {axes[reads]}{axes[turns]}", "accelerometer misalignment", "deg", DEG)
+    for i, axis in enumerate(body):
+        put(LEV + i, f"antenna {axis} of the unit", "lever arm", "m", 1.0)
+    put(LAT, "GNSS latency", "latency", "s", 1.0, estimate.problem.latency_s)
+    put(LAG, "GNSS velocity behind its position", "latency", "s", 1.0, estimate.problem.lag_s)
+    put(MNT, "travel in the unit, yaw", "mounting", "deg", DEG)
+    put(MNT + 1, "travel in the unit, pitch", "mounting", "deg", DEG)
+    return tuple(rows)
+
+
+def residuals_of(estimates: tuple[Estimate, ...]) -> TrajectoryResiduals:
+    """Return GNSS minus the smoothed solution at the antenna, with its errors that last taken for its own."""
+    parts = []
+    for one in estimates:
+        parts.append(_residuals(one))
+    time_s, place, moving, used = (np.concatenate([part[i] for part in parts]) for i in range(4))
+    rows = rows_shown(time_s)
+    return TrajectoryResiduals(
+        time_s=time_s[rows],
+        position_north_m=place[rows, 0],
+        position_east_m=place[rows, 1],
+        position_down_m=place[rows, 2],
+        velocity_north_mps=moving[rows, 0],
+        velocity_east_mps=moving[rows, 1],
+        velocity_down_mps=moving[rows, 2],
+        is_used=used[rows],
+        is_held_out=np.zeros(len(rows), dtype=bool),
+    )
+
+
+def _residuals(estimate: Estimate) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return times, residuals of position and of velocity, and what was used."""
+    done = estimate.result
+    kind, linear = done.plan.seen.kind, done.linear
+    epoch = np.repeat(np.arange(len(done.plan.epoch_s)), np.diff(done.plan.schedule.seen))
+    constants = done.constants - linear.value[-1]
+    x = np.zeros((len(done.plan.epoch_s), STATES))
+    x[:] = constants
+    x[:, :KEPT_ROWS] = done.x
+    for at in range(LAG + 1, MNT):
+        x[:, at] = 0.0
+    scalars = 3 * len(kind)
+    predicted = (linear.h * np.take_along_axis(x[np.repeat(epoch, 3)], linear.columns, axis=1)).sum(axis=1)
+    error = np.where(np.abs(linear.z) < 0.5 * NO_ROW, linear.z - predicted, np.nan)[:scalars].reshape(-1, 3)
+    used = done.solved.mark.reshape(-1, 3).max(axis=1) == 1
+    valid_s = done.plan.epoch_s[epoch] - done.plan.seen.back_s
+    position, velocity = np.flatnonzero(kind == POSITION), np.flatnonzero(kind == VELOCITY)
+    beside = np.full((len(position), 3), np.nan)
+    if len(velocity):
+        near = np.clip(np.searchsorted(valid_s[velocity], valid_s[position]), 0, len(velocity) - 1)
+        before = np.maximum(near - 1, 0)
+        closer = np.abs(valid_s[velocity[before]] - valid_s[position]) < np.abs(
+            valid_s[velocity[near]] - valid_s[position]
+        )
+        near = np.where(closer, before, near)
+        beside = error[velocity[near]]
+    return valid_s[position], error[position], beside, used[position]
+
+
+def biases_of(estimates: tuple[Estimate, ...]) -> TrajectoryBiases:
+    """Return the smoothed biases over time, once a second."""
+    times, values, sigmas = [], [], []
+    for one in estimates:
+        done = one.result
+        at = np.unique(np.floor(done.plan.epoch_s), return_index=True)[1]
+        times.append(done.plan.epoch_s[at])
+        values.append((done.linear.value[:, BG:KEPT_ROWS] + done.x[:, BG:])[at])
+        sigmas.append(np.sqrt(np.maximum(done.variance[at][:, BG:], 0.0)))
+    time_s, value, sigma = np.concatenate(times), np.concatenate(values), np.concatenate(sigmas)
+    rows = rows_shown(time_s)
+    per = np.array([DEG, DEG, DEG, MG_PER, MG_PER, MG_PER])
+    value, sigma = value[rows] / per, sigma[rows] / per
+    return TrajectoryBiases(
+        time_s=time_s[rows],
+        gyro_x_dps=value[:, 0],
+        gyro_y_dps=value[:, 1],
+        gyro_z_dps=value[:, 2],
+        gyro_x_sigma_dps=sigma[:, 0],
+        gyro_y_sigma_dps=sigma[:, 1],
+        gyro_z_sigma_dps=sigma[:, 2],
+        accel_x_mg=value[:, 3],
+        accel_y_mg=value[:, 4],
+        accel_z_mg=value[:, 5],
+        accel_x_sigma_mg=sigma[:, 3],
+        accel_y_sigma_mg=sigma[:, 4],
+        accel_z_sigma_mg=sigma[:, 5],
+    )
+
+
+def outages_of(outages: Outages, factor: float) -> TrajectoryOutages:
+    """Return the replayed outages, sigmas raised."""
+    return TrajectoryOutages(
+        start_s=outages.start_s,
+        length_s=outages.length_s,
+        smoothed_error_m=outages.error_m,
+        smoothed_sigma_m=factor * outages.sigma_m,
+        forward_end_error_m=outages.forward_end_m,
+        is_inside95=outages.ratio <= factor,
+    )
