@@ -1,10 +1,13 @@
 """The trajectory's filter against pyins's feedback filter and INSLIB's C filter, on simulated logs with known truth.
 
 All sides get the same increments, fixes, lever arm, start with the same errors, and noise of the unit's class. pyins
-estimates position, velocity, attitude, biases, and scale factors and misalignments of the gyro (24 states); INSLIB the
-first 15. They take turns, warm, and figures are processor seconds, best of several rounds (pyins on an excerpt); INSLIB
-is called from a compiled loop, so that no Python is timed. Errors are those of whole logs, once a second in their
-second half; "squares" is the mean of squared errors over the variance that the filter states, 1 where its sigmas hold.
+and ours estimate position, velocity, attitude, biases, scale factors and misalignments (33 states), INSLIB position to
+biases (15). They take turns, warm, and figures are processor seconds, best of several rounds (pyins on an excerpt);
+INSLIB is called from a compiled loop, so that no Python is timed. "smoothed" is our filter with its smoother, "again" a
+further pass about what was smoothed.
+
+Errors are those of whole logs, once a second in their second half (pyins, which takes minutes, on the first log alone).
+"squares" is the mean of squared errors over the variance that the filter states, 1 where its sigmas hold.
 
 Peers: ``pip install python-ins inslib`` (INSLIB is under the AGPL: for this comparison alone).
 """
@@ -43,13 +46,17 @@ from groundstation.systems.trajectory.model import Model, StartSigmas, gate  # n
 from groundstation.systems.trajectory.observations import of_gnss  # noqa: E402
 from groundstation.systems.trajectory.passes import (  # noqa: E402
     NOTHING_HELD,
+    OWN_ESTIMATE,
     PATTERN,
     Pass,
     Plan,
     Samples,
     Start,
+    at_line,
     fill_gaps,
     lay_out,
+    line_of,
+    linear_room,
     make_room,
     nothing_kept,
     run_pass,
@@ -60,6 +67,7 @@ from groundstation.systems.trajectory.states import LEV, NAVIGATION, STATES, Gat
 from groundstation.systems.trajectory.track import forward_track, smoothed_track  # noqa: E402
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 DURATION_S = 300.0
 EXCERPT_S = 20.0  # timed of pyins
 ROUNDS = 3
@@ -89,6 +97,8 @@ class Given:
     accelerometer_walk: float
     scale: float
     misalignment: float
+    accelerometer_scale: float
+    accelerometer_misalignment: float
 
     @property
     def samples(self) -> int:
@@ -160,10 +170,12 @@ def _noise_of(of: ImuClass) -> tuple[float, ...]:
         of.accelerometer_random_ug * micro_g * np.sqrt(2.0 / of.accelerometer_correlation_s),
         1e-6 * of.gyro_scale_factor_ppm,
         1e-6 * of.gyro_cross_axis_ppm,
+        1e-6 * of.accelerometer_scale_factor_ppm,
+        1e-6 * of.accelerometer_cross_axis_ppm,
     )
 
 
-def judged_at(of: Given) -> NDArray[np.int64]:
+def judged_at(of: Given) -> Indices:
     """Return the samples at which errors are judged: once a second in the second half."""
     step = round(of.flight.settings.rate_hz)
     return np.arange(len(of.flight.time_s) // 2, len(of.flight.time_s), step)
@@ -179,9 +191,11 @@ def by_pyins(of: Given) -> Side:
     start = pd.Series(of.start, columns, name=flight.time_s[0])
     values = [gnss.latitude_deg, gnss.longitude_deg, gnss.height_m, *gnss.velocity_mps.T]
     fixes = pd.DataFrame(np.stack(values, axis=1), gnss.validity_s, columns[:6]).loc[flight.time_s[0] :]
-    cross = np.where(np.eye(3, dtype=bool), of.scale, of.misalignment)
+    is_axis = np.eye(3, dtype=bool)
+    cross = np.where(is_axis, of.scale, of.misalignment)
     gyro = EstimationModel(of.gyro_bias, of.gyro_noise, of.gyro_walk, cross)
-    accelerometer = EstimationModel(of.accelerometer_bias, of.accelerometer_noise, of.accelerometer_walk)
+    cross = np.where(is_axis, of.accelerometer_scale, of.accelerometer_misalignment)
+    accelerometer = EstimationModel(of.accelerometer_bias, of.accelerometer_noise, of.accelerometer_walk, cross)
     seen = [
         Position(fixes, POSITION_SIGMA_M, flight.lever_arm_m),
         NedVelocity(fixes, VELOCITY_SIGMA_MPS, flight.lever_arm_m),
@@ -373,6 +387,9 @@ def prepared(of: Given) -> OurPass:
         velocity_floor_mps=0.0,
         slow_scale=0.0,
         fast_scale=0.0,
+        jitter_s=0.0,
+        gyro_imperfection=1.0,
+        accel_imperfection=1.0,
     )
     noise = model.noise(np.full(3, POSITION_SIGMA_M))
     sigmas = StartSigmas(
@@ -380,9 +397,11 @@ def prepared(of: Given) -> OurPass:
         accel_bias_mg=of.accelerometer_bias * micro_g_of,
         gyro_scale=of.scale,
         misalignment_deg=float(np.degrees(of.misalignment)),
+        accel_scale=of.accelerometer_scale,
+        accel_misalignment_deg=float(np.degrees(of.accelerometer_misalignment)),
         lever_m=0.0,
     )
-    variances = sigmas.variances(noise, has_latency=False, has_slip=False, has_baro=False)
+    variances = sigmas.variances(noise, model, has_latency=False, has_slip=False, has_baro=False)
     level, heading = np.radians([LEVEL_START_DEG, HEADING_START_DEG])
     variances[:NAVIGATION] = np.square([*[POSITION_START_M] * 3, *[VELOCITY_START_MPS] * 3, level, level, heading])
     value = np.zeros(STATES)
@@ -394,8 +413,7 @@ def prepared(of: Given) -> OurPass:
     return OurPass(samples, plan, noise, gate(), start)
 
 
-def _judged(of: Given, run: OurPass, track: Callable[[Samples, Pass, NDArray[np.int64]], TrackOfStates]) -> Found:
-    done = run_pass(run.samples, run.plan, run.noise, run.rules, run.start)
+def _judged(of: Given, run: OurPass, done: Pass, track: Callable[[Samples, Pass, Indices], TrackOfStates]) -> Found:
     states = track(run.samples, done, judged_at(of) - 1)
     return Found(
         np.stack([states.latitude_deg, states.longitude_deg, states.height_m], axis=1),
@@ -405,25 +423,39 @@ def _judged(of: Given, run: OurPass, track: Callable[[Samples, Pass, NDArray[np.
     )
 
 
+def _once(run: OurPass) -> Pass:
+    return run_pass(run.samples, run.plan, run.noise, run.rules, run.start)
+
+
+def _again(run: OurPass, done: Pass) -> Pass:
+    line = line_of(done)
+    return run_pass(run.samples, run.plan, run.noise, run.rules, at_line(done.start, line), line)
+
+
 def by_us(of: Given) -> Side:
     """Return the run of our filter alone."""
     run = prepared(of)
+    linear = linear_room(run.samples, run.plan)
 
     def filtered() -> float:
         now, room, epochs = run.start.now(), make_room(run.start.prior), len(run.plan.epoch_s)
         parts = run.samples.imu, run.plan.schedule, run.plan.seen, run.noise, run.rules, PATTERN, NOTHING_HELD
-        return run_forward(*parts, 0, epochs, now, room, nothing_kept())
+        return run_forward(*parts, OWN_ESTIMATE, True, True, 0, epochs, now, room, linear, nothing_kept())
 
-    return Side(filtered, lambda: _judged(of, run, forward_track))
+    return Side(filtered, lambda: _judged(of, run, _once(run), forward_track))
 
 
 def by_us_smoothed(of: Given) -> Side:
     """Return the run of our filter with its smoother."""
     run = prepared(of)
-    return Side(
-        lambda: run_pass(run.samples, run.plan, run.noise, run.rules, run.start),
-        lambda: _judged(of, run, smoothed_track),
-    )
+    return Side(lambda: _once(run), lambda: _judged(of, run, _once(run), smoothed_track))
+
+
+def by_us_again(of: Given) -> Side:
+    """Return a pass about the smoothed trajectory; two of them are judged."""
+    run = prepared(of)
+    first = _once(run)
+    return Side(lambda: _again(run, first), lambda: _judged(of, run, _again(run, _again(run, first)), smoothed_track))
 
 
 def errors_of(of: Given, found: Found) -> Array:
@@ -447,6 +479,7 @@ SIDES: dict[str, Callable[[Given], Side]] = {
     "INSLIB": by_inslib,
     "ours": by_us,
     "smoothed": by_us_smoothed,
+    "again": by_us_again,
 }
 
 
@@ -470,23 +503,27 @@ def speeds(family: Family, name: str, rate_hz: float, fixes_hz: float) -> dict[s
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=2, help="logs of each case on which errors are judged")
+    parser.add_argument("--seeds", type=int, default=10, help="logs of each case on which errors are judged")
     parser.add_argument("--without", nargs="*", default=[], choices=SIDES, help="sides left out")
     given_options = parser.parse_args()
     for who in given_options.without:
         del SIDES[who]
     for family, name, rate_hz, fixes_hz in CASES:
-        print(f"{family}, {name} unit at {rate_hz:g} Hz, fixes at {fixes_hz:g} Hz")
+        print(f"{family}, {name} unit at {rate_hz:g} Hz, fixes at {fixes_hz:g} Hz", flush=True)
         speed = speeds(family, name, rate_hz, fixes_hz)
         logs = [given(family, name, rate_hz, fixes_hz, seed, DURATION_S) for seed in range(1, given_options.seeds + 1)]
         for who, make in SIDES.items():
-            parts = [(errors_of(of, found), found.sigma) for of, found in ((of, make(of).judged()) for of in logs)]
+            mine = logs[:1] if who == "pyins" else logs
+            parts = [(errors_of(of, found), found.sigma) for of, found in ((of, make(of).judged()) for of in mine)]
             error, sigma = (np.concatenate(part) for part in zip(*parts, strict=True))
             rms, squares = np.sqrt(np.mean(error**2, axis=0)), np.mean((error / sigma) ** 2, axis=0)
-            place, velocity = (float(np.sqrt(np.sum(rms[at : at + 3] ** 2))) for at in (0, 3))
+            place, velocity, tilt = (float(np.sqrt(np.sum(rms[at:end] ** 2))) for at, end in ((0, 3), (3, 6), (6, 8)))
+            tilt_squares = "" if who == "INSLIB" else f", {np.mean(squares[6:8]):.2f}"  # its angles are others
             print(
                 f"  {who:8s} {speed[who]:9.0f} samples/s; position {place:.2f} m, squares {np.mean(squares[:3]):.2f}; "
-                f"velocity {velocity:.3f} m/s, {np.mean(squares[3:6]):.2f}; heading {rms[8]:.2f} deg, {squares[8]:.2f}"
+                f"velocity {velocity:.3f} m/s, {np.mean(squares[3:6]):.2f}; "
+                f"tilt {tilt:.2f} deg{tilt_squares}; heading {rms[8]:.2f} deg, {squares[8]:.2f}",
+                flush=True,
             )
 
 
