@@ -1,0 +1,104 @@
+"""Whole analysis on simulated logs: what is accepted, doubtful and refused, and that sigmas hold."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from groundstation.base.angles import wrap_180
+from groundstation.base.geodesy import north_east_m
+from groundstation.simulation.imu.flight import ImuFlight, simulate_imu
+from groundstation.simulation.imu.settings import ImuSettings, MountingSettings, ReceiverSettings, StampSettings
+from groundstation.simulation.scenario import LogInterval
+from groundstation.systems.trajectory.estimate import Estimate, estimate
+from groundstation.systems.trajectory.inputs import GnssFixes, ImuIncrements
+from groundstation.systems.trajectory.outages import replay
+from groundstation.systems.trajectory.sampling import at_times
+from groundstation.systems.trajectory.track import smoothed_track
+
+WITHIN = 4.0  # sigmas: of some hundred independent errors none is larger
+
+
+def inputs(flight: ImuFlight) -> tuple[ImuIncrements, GnssFixes]:
+    """Input of the estimator from a simulated flight, axes those of the body."""
+    gnss = flight.gnss
+    imu = ImuIncrements(
+        flight.time_s,
+        flight.interval_s,
+        flight.delta_angle_rad @ flight.case_from_body,
+        flight.delta_velocity_mps @ flight.case_from_body,
+        flight.is_integral,
+    )
+    fixes = GnssFixes(
+        gnss.time_s,
+        gnss.latitude_deg,
+        gnss.longitude_deg,
+        gnss.height_m,
+        gnss.velocity_mps,
+        gnss.position_sigma_m,
+        gnss.velocity_sigma_mps,
+        np.zeros(len(gnss.time_s), dtype=bool),
+    )
+    return imu, fixes
+
+
+def errors_over_sigma(flight: ImuFlight, done: Estimate) -> dict[str, np.ndarray]:
+    """Errors of the smoothed states over their sigmas, once a second after a minute; a constant turn of the axes apart."""
+    time_s = np.arange(60.0, flight.true_time_s[-1] - 1.0, 1.0)
+    states = at_times(smoothed_track(done.problem.samples, done.result), time_s)
+    at = np.searchsorted(flight.true_time_s, time_s)
+    north, east = north_east_m(
+        states.latitude_deg, states.longitude_deg, flight.latitude_deg[at], flight.longitude_deg[at]
+    )
+    heading = np.asarray(wrap_180(states.heading_deg - flight.heading_deg[at]))
+    heading = heading - np.median(heading)
+    return {
+        "north": north / states.position_sigma_m[:, 0],
+        "east": east / states.position_sigma_m[:, 1],
+        "velocity": (states.velocity_mps - flight.velocity_mps[at])[:, :2].ravel()
+        / states.velocity_sigma_mps[:, :2].ravel(),
+        "heading": heading / states.attitude_sigma_deg[:, 2],
+    }
+
+
+@pytest.mark.parametrize("family", ["drive", "uav"])
+def test_errors_agree_with_their_sigmas(family: str) -> None:
+    flight = simulate_imu(family, 3, settings=ImuSettings(duration_s=300.0, rate_hz=50.0))  # type: ignore[arg-type]
+    done = estimate(*inputs(flight), may_roll=family == "drive", may_stop=family == "drive")
+    for name, ratio in errors_over_sigma(flight, done).items():
+        assert np.sqrt(np.mean(ratio**2)) < 2.0, name
+        assert np.abs(ratio).max() < WITHIN, name
+    assert len(done.hypotheses) == 1 or done.hypotheses[0].likelihood - done.hypotheses[1].likelihood > 10.0
+
+
+def test_latency_lever_arm_and_gap_are_found() -> None:
+    settings = ImuSettings(
+        duration_s=300.0,
+        rate_hz=50.0,
+        gnss=ReceiverSettings(latency_s=0.3),
+        mounting=MountingSettings(lever_arm_m=(0.8, -0.4, -0.6)),
+        stamps=StampSettings(gaps=(LogInterval(100.0, 100.4),)),
+    )
+    done = estimate(*inputs(simulate_imu("uav", 5, settings=settings)), may_stop=False)
+    assert done.latency_s == pytest.approx(0.3, abs=0.02)
+    assert done.lag_s == pytest.approx(0.0, abs=0.03)
+
+
+def test_outages_grow_with_their_length_and_stay_inside() -> None:
+    flight = simulate_imu("drive", 4, settings=ImuSettings(duration_s=400.0, rate_hz=50.0))
+    found = replay(estimate(*inputs(flight), may_roll=True))
+    rms = [float(np.sqrt(np.mean(found.error_m[found.of_length(length)] ** 2))) for length in (10.0, 60.0)]
+    assert rms[0] < rms[1] < 20.0
+    assert np.mean(found.ratio <= 1.0) > 0.8
+    assert np.median(found.forward_end_m / found.error_m) > 1.5
+
+
+def test_later_in_time_all_is_the_same() -> None:
+    flight = simulate_imu("uav", 6, settings=ImuSettings(duration_s=200.0, rate_hz=50.0))
+    imu, gnss = inputs(flight)
+    plain = estimate(imu, gnss, may_stop=False, fit=False)
+    later = estimate(
+        replace(imu, time_s=imu.time_s + 1e5), replace(gnss, time_s=gnss.time_s + 1e5), may_stop=False, fit=False
+    )
+    assert later.result.likelihood == pytest.approx(plain.result.likelihood, abs=1.0)
+    assert later.result.constants[:30] == pytest.approx(plain.result.constants[:30], abs=1e-3)
