@@ -102,7 +102,7 @@ def test_a_doubtful_solution_says_so_first_and_blames_nobody() -> None:
 
 def test_an_ambiguous_heading_shows_both_and_claims_neither() -> None:
     section = section_of(ambiguous())
-    assert section.headline.startswith("two headings explain the log, 40 or 195° at the start")
+    assert section.headline.startswith("two headings explain the log, 312 or 107° at the end")
     rows = grid(section, "Hypotheses").rows
     assert [row[1] for row in rows] == ["40.0°", "195.0°"] and rows[1][3] == "3.2"
     assert not any(row[0] == "Heading" for row in grid(section, "Accuracy").rows)
@@ -121,7 +121,9 @@ def test_without_a_filter_on_board_nothing_is_said_of_it() -> None:
 
 def test_a_filter_that_is_right_is_said_to_be() -> None:
     section = section_of(ANSWERS["hover"])
-    assert notes(section)[0].startswith("The on-board filter is nowhere wrong beyond 95 % for two seconds; it differs by heading 0.0")
+    assert notes(section)[0].startswith(
+        "The on-board filter is nowhere wrong beyond 95 % for two seconds; it differs by heading 0.0"
+    )
     assert {getattr(row[-1], "text", "") for row in grid(section, "Errors of the on-board").rows} == {"nowhere"}
 
 
