@@ -27,7 +27,7 @@ from groundstation.systems.trajectory.arrays import (
     TrajectoryResiduals,
     TrajectoryTrack,
 )
-from groundstation.systems.trajectory.figures import accuracy_of, segments_of, separation_of, track_figure
+from groundstation.systems.trajectory.figures import accuracy_of, segments_of, separation_of, states_of, track_figure
 from groundstation.systems.trajectory.onboard import compare_onboard
 from groundstation.systems.trajectory.solution import TrackOfStates
 from tests.report_example import example
@@ -94,6 +94,7 @@ def accepted(of: TrackOfStates | None = None, *, heading_error_deg: float = 2.1,
         settings={},
         figures=(
             track_figure(states),
+            states_of(states, "ellipsoid"),
             separation,
             *(() if compared is None else (compared.figure,)),
             _residuals(states),
