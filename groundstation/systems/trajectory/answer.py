@@ -17,8 +17,9 @@ NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not o
 TrajectoryState = Literal["accepted", "doubtful", "ambiguous"]
 MountingSource = Literal["stated", "logged", "found", "case"]
 OutageTruth = Literal["undisturbed solution", "RTK"]
-ARM_AXES = ("lever arm forward", "lever arm right", "lever arm down")  # names of the parameters, and of the latency
-LATENCY = "GNSS latency"
+# Names of parameters that others read: of the lever arm, and of the receiver's delay.
+ARM = ("antenna forward of the unit", "antenna right of the unit", "antenna down of the unit")
+LATENCY, VELOCITY_LAG = "GNSS latency", "GNSS velocity behind its position"
 OffsetCause = Literal["", "mounting", "antenna", "datum"]
 Quantity = Literal[
     "heading",
@@ -466,7 +467,7 @@ class BestTrajectory(Answer, StatesAlongTheFlight):
     def antenna_arm_m(self) -> tuple[float, float, float]:
         """Antenna from the inertial unit: forward, right, down; 0 where it is not observable."""
         forward, right, down = (
-            one.value if (one := self.parameter(name)) is not None and one.is_observable else 0.0 for name in ARM_AXES
+            one.value if (one := self.parameter(name)) is not None and one.is_observable else 0.0 for name in ARM
         )
         return forward, right, down
 

@@ -189,9 +189,9 @@ def _parameters() -> tuple[TrajectoryParameter, ...]:
         for axis, value in zip("xyz", (3.4, -12.0, 7.7), strict=True)
     ]
     rows += [
-        TrajectoryParameter("lever arm forward", "lever arm", "m", 0.61, 0.12, 2.0, True),
-        TrajectoryParameter("lever arm right", "lever arm", "m", -0.05, 0.14, 2.0, True),
-        TrajectoryParameter("lever arm down", "lever arm", "m", 0.2, 1.9, 2.0, False),
+        TrajectoryParameter("antenna forward of the unit", "lever arm", "m", 0.61, 0.12, 2.0, True),
+        TrajectoryParameter("antenna right of the unit", "lever arm", "m", -0.05, 0.14, 2.0, True),
+        TrajectoryParameter("antenna down of the unit", "lever arm", "m", 0.2, 1.9, 2.0, False),
         TrajectoryParameter("GNSS latency", "latency", "s", 0.112, 0.004, 0.3, True),
         TrajectoryParameter("wheel scale", "wheel", "%", 1.4, 0.1, 5.0, True),
     ]
