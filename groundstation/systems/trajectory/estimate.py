@@ -267,6 +267,7 @@ def estimate(
     may_roll: bool = False,
     may_stop: bool = True,
     prior: Model | None = None,
+    sigmas: StartSigmas | None = None,
     fit: bool = True,
 ) -> Estimate:
     """Estimate the trajectory of one segment.
@@ -280,11 +281,15 @@ def estimate(
         It may stand still on its way.
     prior : Model, optional
         Numbers of the class.
+    sigmas : StartSigmas, optional
+        Of the constants at the start.
     fit : bool
         False: the numbers of ``prior`` as they are.
     """
     model = Model() if prior is None else prior
     problem = pose(imu, gnss, may_stop=may_stop)
+    if sigmas is not None:
+        problem = replace(problem, sigmas=sigmas)
     open_gate, rules = gate(OPEN_SIGMAS), gate(CLOSED_SIGMAS)
     first = hypotheses_of(problem, model, open_gate)
     problem, start, done = settle(problem, model, open_gate, first[0].start, LATENCY_ROUNDS)

@@ -28,6 +28,13 @@ def normal_gravity(sine: float, height_m: float) -> float:
 
 
 @inlined
+def shorter_way(angle: float) -> float:
+    """Return an angle between two directions, or two longitudes, by the shorter way, rad."""
+    turns = angle / (2.0 * math.pi)
+    return (turns - math.floor(turns + 0.5)) * 2.0 * math.pi
+
+
+@inlined
 def rotation_of(nav: FloatArray, C: FloatArray) -> None:
     """Fill C from the quaternion of the estimate."""
     w, x, y, z = nav[6], nav[7], nav[8], nav[9]
