@@ -217,28 +217,18 @@ def grow_transition(C: FloatArray, step: FloatArray, grown: FloatArray) -> None:
     Velocity errors turn with the frame over the epoch (``finish_transition``).
     """
     dt = step[15]
-    for i in range(3):  # biases, scale: the unit's axes
+    for i in range(3):  # the unit's axes: i reads, j turns
         x, y, z = C[0, i], C[1, i], C[2, i]
-        _grow_column(grown, BG + i, -x * dt, -y * dt, -z * dt, step)
-        a = step[i]
-        _grow_column(grown, SG + i, -x * a, -y * a, -z * a, step)
-        _push_column(grown, BA + i, -x * dt, -y * dt, -z * dt, dt)
-        a = step[16 + i]
-        _push_column(grown, SA + i, -x * a, -y * a, -z * a, dt)
-    a, b, c = step[0], step[1], step[2]
-    _grow_column(grown, MG, -C[0, 0] * b, -C[1, 0] * b, -C[2, 0] * b, step)
-    _grow_column(grown, MG + 1, -C[0, 0] * c, -C[1, 0] * c, -C[2, 0] * c, step)
-    _grow_column(grown, MG + 2, -C[0, 1] * a, -C[1, 1] * a, -C[2, 1] * a, step)
-    _grow_column(grown, MG + 3, -C[0, 1] * c, -C[1, 1] * c, -C[2, 1] * c, step)
-    _grow_column(grown, MG + 4, -C[0, 2] * a, -C[1, 2] * a, -C[2, 2] * a, step)
-    _grow_column(grown, MG + 5, -C[0, 2] * b, -C[1, 2] * b, -C[2, 2] * b, step)
-    a, b, c = step[16], step[17], step[18]
-    _push_column(grown, MA, -C[0, 0] * b, -C[1, 0] * b, -C[2, 0] * b, dt)
-    _push_column(grown, MA + 1, -C[0, 0] * c, -C[1, 0] * c, -C[2, 0] * c, dt)
-    _push_column(grown, MA + 2, -C[0, 1] * a, -C[1, 1] * a, -C[2, 1] * a, dt)
-    _push_column(grown, MA + 3, -C[0, 1] * c, -C[1, 1] * c, -C[2, 1] * c, dt)
-    _push_column(grown, MA + 4, -C[0, 2] * a, -C[1, 2] * a, -C[2, 2] * a, dt)
-    _push_column(grown, MA + 5, -C[0, 2] * b, -C[1, 2] * b, -C[2, 2] * b, dt)
+        for j in range(4):
+            turn, push, a, b = BG + i, BA + i, dt, dt
+            if j < 3:
+                a, b = step[j], step[16 + j]
+                turn, push = SG + i, SA + i
+                if j != i:
+                    at = 2 * i + j - (1 if j > i else 0)
+                    turn, push = MG + at, MA + at
+            _grow_column(grown, turn, -x * a, -y * a, -z * a, step)
+            _push_column(grown, push, -x * b, -y * b, -z * b, dt)
     # attitude: the specific force, once for velocity and twice for position
     for i in range(3):
         n, e, d = 0.0, 0.0, 0.0

@@ -73,9 +73,9 @@ def measured(kind: int, start: Start) -> FloatArray:
     """Values of a measurement near those of a start, shape (3,)."""
     found = np.full(3, np.nan)
     if kind == POSITION:
-        found[:] = start.nav[:3] + [1e-6, -1e-6, 1.0]
+        found[:] = start.nav[:3] + np.array([1e-6, -1e-6, 1.0])
     elif kind in (VELOCITY, STILL):
-        found[:] = start.nav[3:6] + [0.1, -0.2, 0.3]
+        found[:] = start.nav[3:6] + np.array([0.1, -0.2, 0.3])
     elif kind == NO_RATE:
         found[:] = 0.01, 0.02, -0.03
     elif kind == NO_SLIP:

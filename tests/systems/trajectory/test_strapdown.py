@@ -18,8 +18,8 @@ from tests.systems.trajectory.core_cases import (
     transition,
 )
 
-# Largest error of the velocity after 600 s, m/s. The error of coning and sculling is of the fourth order in the interval:
-# at 50 Hz it is 10 to 20 times that at 100 Hz. Measured at 100 Hz: drive 3.5e-7, uav 9.5e-7, hover 1.0e-7, start in
+# Largest error of the velocity after 600 s, m/s. The error of coning and sculling is of the fourth order in the
+# interval: at 50 Hz it is 10 to 20 times that at 100 Hz. Measured at 100 Hz: drive 3.5e-7, uav 9.5e-7, hover 1.0e-7, start in
 # motion (the fastest turns, from the first sample on) 1.1e-6; hover at 50 Hz 1.9e-6.
 EXACT_MPS: dict[tuple[Family, float], float] = {
     ("drive", 100.0): 1e-6,
@@ -30,8 +30,8 @@ EXACT_MPS: dict[tuple[Family, float], float] = {
 }
 EXACT_RAD = 3e-9
 EVERY = 100
-# Error of the transition over 0.2 s, as the effect of a correction of the size of ``SIZES``. The unit's axes are those at
-# the start of each sample: half a sample of turn, 1e-3 at 15 deg/s. Rounding of the latitude is 1e-6 m.
+# Error of the transition over 0.2 s, as the effect of a correction of the size of ``SIZES``. The unit's axes are those
+# at the start of each sample: half a sample of turn, 1e-3 at 15 deg/s. Rounding of the latitude is 1e-6 m.
 POSITION_M, VELOCITY_MPS, ATTITUDE_RAD = 3e-5, 2e-4, 1e-5
 
 

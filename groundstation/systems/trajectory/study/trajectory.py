@@ -85,7 +85,7 @@ def _page(data: FigureData, families: tuple[StudyFamily, ...], runs: int, seed: 
     head = section(
         "Study: the sigmas of the best trajectory",
         f"{runs} simulated logs of each family (seed {seed}), estimated with the noise of the simulation known: "
-        "nothing is fitted and no sigma is scaled. NEES: mean squared error over variance, 1 where the sigmas are right. "
+        "nothing is fitted and no sigma is scaled. NEES: mean squared error over variance, 1 where sigmas are right. "
         "The filter counts once its heading sigma is below 5 deg. Coverage: share of the smoothed errors within "
         "their 95 % interval.",
         table(data),
