@@ -27,7 +27,7 @@ from groundstation.systems.trajectory.passes import (
     nothing_kept,
 )
 from groundstation.systems.trajectory.start import quaternion_of
-from groundstation.systems.trajectory.states import LEV, NAVIGATION, STATES, Linear, Schedule, Seen
+from groundstation.systems.trajectory.states import BARO, LEV, MNT, NAVIGATION, SLOW, STATES, Linear, Schedule, Seen
 
 FloatArray = NDArray[np.float64]
 NOISE = Model().noise(np.ones(3))
@@ -39,7 +39,7 @@ SIZES = np.concatenate(
         np.full(3, 0.1),
         np.full(3, np.radians(1.0)),
         np.full(3, 0.5),
-        np.full(18, 0.005),
+        np.full(15, 0.005),
         np.full(3, 1.0),
         [0.3, 0.1],
         np.full(6, 3.0),
@@ -157,6 +157,6 @@ def transition(linear: Linear, epoch: int) -> FloatArray:
     """Transition of an epoch as a square matrix."""
     F = np.eye(STATES)
     F[:NAVIGATION, :LEV] = linear.F[epoch, :BLOCK].reshape(NAVIGATION, LEV)
-    for place, state in enumerate((*range(38, 44), 46)):
+    for place, state in enumerate((*range(SLOW, MNT), BARO)):
         F[state, state] = linear.F[epoch, BLOCK + place]
     return F

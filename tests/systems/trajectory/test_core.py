@@ -175,6 +175,7 @@ def process_noise(done: Pass, epoch: int) -> FloatArray:
         Q[6 + axis, 6 + axis] = NOISE.density[0] * total + NOISE.density[4] * turned + of_angle
         Q[BG + axis, BG + axis] = NOISE.density[2] * total
         Q[BA + axis, BA + axis] = NOISE.density[3] * total
+    Q[range(MNT, BARO), range(MNT, BARO)] = NOISE.density[5] * total
     fade = np.diag(transition(done.linear, epoch))
     for place, state in enumerate((*range(SLOW, MNT), BARO)):
         Q[state, state] = NOISE.variance[place] * (1.0 - fade[state] ** 2)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from groundstation.simulation.imu.families import Family
-from groundstation.systems.trajectory.states import LEV, NAVIGATION, STATES
+from groundstation.systems.trajectory.states import BARO, FAST, LEV, MNT, NAVIGATION, SLOW, STATES
 from tests.systems.trajectory.core_cases import (
     SIZES,
     carried,
@@ -72,11 +72,11 @@ def test_other_states_stay_or_fade() -> None:
     flight = perfect("uav")
     samples = samples_of(flight)
     value = np.ones(STATES)
-    value[:33] = 0.0
+    value[:LEV] = 0.0
     start, plan = start_at(flight, 100.0, value), plan_of(samples, [10_000, 10_020, 10_040])
     linear = carried(samples, plan, start)
-    np.testing.assert_allclose(linear.value[2, 33:38], 1.0, rtol=0.0, atol=0.0)
-    np.testing.assert_allclose(linear.value[2, 38:41], np.exp(-0.4 / 300.0), rtol=1e-12)
-    np.testing.assert_allclose(linear.value[2, 41:44], np.exp(-0.4 / 10.0), rtol=1e-12)
-    np.testing.assert_allclose(linear.value[2, 44:46], 1.0, rtol=0.0, atol=0.0)
-    np.testing.assert_allclose(np.diag(transition(linear, 1))[38:44], np.exp(-0.2 / np.repeat([300.0, 10.0], 3)))
+    np.testing.assert_allclose(linear.value[2, LEV:SLOW], 1.0, rtol=0.0, atol=0.0)
+    np.testing.assert_allclose(linear.value[2, SLOW:FAST], np.exp(-0.4 / 300.0), rtol=1e-12)
+    np.testing.assert_allclose(linear.value[2, FAST:MNT], np.exp(-0.4 / 10.0), rtol=1e-12)
+    np.testing.assert_allclose(linear.value[2, MNT:BARO], 1.0, rtol=0.0, atol=0.0)
+    np.testing.assert_allclose(np.diag(transition(linear, 1))[SLOW:MNT], np.exp(-0.2 / np.repeat([300.0, 10.0], 3)))
