@@ -19,8 +19,8 @@ from tests.systems.trajectory.core_cases import (
 )
 
 # Largest error of the velocity after 600 s, m/s. The error of coning and sculling is of the fourth order in the
-# interval: at 50 Hz it is 10 to 20 times that at 100 Hz. Measured at 100 Hz: drive 3.5e-7, uav 9.5e-7, hover 1.0e-7, start in
-# motion (the fastest turns, from the first sample on) 1.1e-6; hover at 50 Hz 1.9e-6.
+# interval: at 50 Hz it is 10 to 20 times that at 100 Hz. Measured at 100 Hz: drive 3.5e-7, uav 9.5e-7, hover 1.0e-7,
+# start in motion (the fastest turns, from the first sample on) 1.1e-6; hover at 50 Hz 1.9e-6.
 EXACT_MPS: dict[tuple[Family, float], float] = {
     ("drive", 100.0): 1e-6,
     ("uav", 100.0): 1e-6,
