@@ -27,6 +27,7 @@ from groundstation.systems.trajectory.figures import offsets_m
 from groundstation.systems.trajectory.onboard_offsets import (
     Constant,
     PlaceOffset,
+    arm_by_turning,
     centre_of,
     constant_turn,
     euler_deg,
@@ -212,10 +213,11 @@ def _errors(track: TrackOfStates, output: _Output, delay_s: float) -> _Errors:
     at_s = output.time_s - delay_s
     ours, length_s = at_times(track, at_s), float(at_s[-1] - at_s[0])
     attitude, offsets = _attitude(output, ours, length_s)
-    plane, place = _plane(output, ours, length_s)
     before, after = (at_times(track, at_s + part).heading_deg for part in (-RATE_S, RATE_S))
-    swing = _swing_mps(place, ours.heading_deg, np.deg2rad(wrap_180(after - before)) / (2.0 * RATE_S))
+    rate = np.deg2rad(wrap_180(after - before)) / (2.0 * RATE_S)
     velocity = output.velocity_mps - ours.velocity_mps
+    plane, place = _plane(output, ours, length_s, arm_by_turning(velocity[:, :2], ours.heading_deg, rate))
+    swing = _swing_mps(place, ours.heading_deg, rate)
     velocity[:, :2] -= np.where(np.isfinite(swing), swing, 0.0)
     height = output.height_m - ours.height_m
     level = centre_of(height, ours.position_sigma_m[:, 2], length_s)
@@ -240,7 +242,9 @@ def _attitude(
     return error - np.array([one.value for one in found]), (roll, pitch, heading)
 
 
-def _plane(output: _Output, ours: TrackOfStates, length_s: float) -> tuple[FloatArray, PlaceOffset]:
+def _plane(
+    output: _Output, ours: TrackOfStates, length_s: float, arm: tuple[Constant, Constant]
+) -> tuple[FloatArray, PlaceOffset]:
     """Return errors north and east, and what was constant in them."""
     if np.isfinite(output.latitude_deg).any():
         theirs = (output.latitude_deg, output.longitude_deg, output.height_m)
@@ -250,7 +254,7 @@ def _plane(output: _Output, ours: TrackOfStates, length_s: float) -> tuple[Float
         origin = (float(ours.latitude_deg[first]), float(ours.longitude_deg[first]))
         error = output.plane_m - np.column_stack(north_east_m(ours.latitude_deg, ours.longitude_deg, *origin))
     sigma = np.hypot(ours.position_sigma_m[:, 0], ours.position_sigma_m[:, 1]) / 2.0**0.5
-    place = place_offset(error, ours.heading_deg, sigma, length_s)
+    place = place_offset(error, ours.heading_deg, sigma, length_s, arm)
     return error - place.fitted, place
 
 
