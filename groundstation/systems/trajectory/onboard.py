@@ -4,7 +4,7 @@ An offset that is the same all through the log is how the units are mounted, or 
 of another datum. It is told and taken off; the filter is never blamed for it. A delay of its stamps likewise.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -46,6 +46,7 @@ BIN_S, MOST_BINS = 1.0, 20_000  # errors are judged and shown as medians over it
 FEWEST = 30  # samples beside the track
 RATE_S = 0.1  # half the time over which rates are taken
 SHIFT_STEPS, MOST_SHIFT_S = 4, 1.0
+OPPOSITE = -0.8  # correlation with ours below which the sign of a velocity is the other one
 STEEP_DEG = 80.0  # pitch beyond which roll and heading say little
 ANGLES: tuple[Quantity, ...] = ("roll", "pitch", "heading")
 NOTHING = Constant(0.0, 0.0)
@@ -116,11 +117,12 @@ def compare_onboard(track: TrackOfStates, flight: Flight, topic: str) -> Compare
     output, track = _output(flight, topic), every(track, STATE_STEP_S)
     if output is None or np.isfinite(at_times(track, output.time_s).heading_deg).sum() < FEWEST:
         return None
+    output, is_upward = _with_down(output, at_times(track, output.time_s).velocity_mps[:, 2])
     delay = _delay(track, output)
     found = _errors(track, output, delay.value if delay.is_told else 0.0)
     bins = _Bins(output.time_s)
     figure = _figure(found, output, bins)
-    rows = tuple(_rows(found, figure, bins))
+    rows = tuple(_rows(found, figure, bins, UPWARD if is_upward else _Told()))
     if not rows:
         return None
     is_seen = np.isfinite(delay.sigma)
@@ -151,6 +153,17 @@ def _output(flight: Flight, topic: str) -> _Output | None:
         height,
         np.column_stack([table.values(f"position_{axis}_m") for axis in ("north", "east")]),
     )
+
+
+def _with_down(output: _Output, down_mps: FloatArray) -> tuple[_Output, bool]:
+    """Return the output with its velocity downward, and whether it logs it upward."""
+    theirs = output.velocity_mps[:, 2]
+    known = np.isfinite(theirs) & np.isfinite(down_mps)
+    if known.sum() < FEWEST or not np.std(down_mps[known]) * np.std(theirs[known]) > 0.0:
+        return output, False
+    if np.corrcoef(theirs[known], down_mps[known])[0, 1] > OPPOSITE:
+        return output, False
+    return replace(output, velocity_mps=output.velocity_mps * np.array([1.0, 1.0, -1.0])), True
 
 
 def _delay(track: TrackOfStates, output: _Output) -> Constant:
@@ -325,7 +338,10 @@ class _Told(NamedTuple):
     words: str = ""
 
 
-def _rows(found: _Errors, figure: TrajectoryOnboard, bins: _Bins) -> list[OnboardError]:
+UPWARD = _Told(cause="sign", words="logged with the other sign: up, not down")
+
+
+def _rows(found: _Errors, figure: TrajectoryOnboard, bins: _Bins, down: _Told) -> list[OnboardError]:
     ours = found.ours
     rows: list[OnboardError | None] = []
     binned = ((figure.roll_deg, figure.roll_sigma_deg), (figure.pitch_deg, figure.pitch_sigma_deg))
@@ -341,9 +357,9 @@ def _rows(found: _Errors, figure: TrajectoryOnboard, bins: _Bins) -> list[Onboar
     )
     own = np.hypot(ours.velocity_sigma_mps[:, 0], ours.velocity_sigma_mps[:, 1])
     rows.append(_row("horizontal velocity", found.velocity_mps[:, :2], own, _Told(), plane, bins))
-    down = (figure.velocity_down_mps, figure.vertical_velocity_sigma_mps)
+    climb = (figure.velocity_down_mps, figure.vertical_velocity_sigma_mps)
     own = ours.velocity_sigma_mps[:, 2]
-    rows.append(_row("vertical velocity", found.velocity_mps[:, 2], own, _Told(), down, bins))
+    rows.append(_row("vertical velocity", found.velocity_mps[:, 2], own, down, climb, bins))
     place = (np.column_stack([figure.position_north_m, figure.position_east_m]), figure.horizontal_position_sigma_m)
     own = np.hypot(ours.position_sigma_m[:, 0], ours.position_sigma_m[:, 1])
     rows.append(_row("horizontal position", found.plane_m, own, _told_place(found.place), place, bins))
