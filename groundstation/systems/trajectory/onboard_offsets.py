@@ -87,7 +87,7 @@ def euler_deg(n_from_b: FloatArray) -> FloatArray:
 
 
 def arm_by_turning(error_mps: FloatArray, heading_deg: FloatArray, rate_radps: FloatArray) -> tuple[Constant, Constant]:
-    """Return the place on the vehicle, forward and right, whose turning explains errors of velocity, shape (n, 2)."""
+    """Return the place on the vehicle, forward and right, that its turning shows."""
     known = np.isfinite(error_mps).all(axis=1) & np.isfinite(heading_deg) & np.isfinite(rate_radps)
     if known.sum() < FEWEST:
         return Constant(0.0, ARM_SIGMA_M), Constant(0.0, ARM_SIGMA_M)
