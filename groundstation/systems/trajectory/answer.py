@@ -20,7 +20,7 @@ OutageTruth = Literal["undisturbed solution", "RTK"]
 # Names of parameters that others read: of the lever arm, and of the receiver's delay.
 ARM = ("antenna forward of the unit", "antenna right of the unit", "antenna down of the unit")
 LATENCY, VELOCITY_LAG = "GNSS latency", "GNSS velocity behind its position"
-OffsetCause = Literal["", "mounting", "antenna", "datum"]
+OffsetCause = Literal["", "mounting", "antenna", "datum", "sign"]
 Quantity = Literal[
     "heading",
     "roll",

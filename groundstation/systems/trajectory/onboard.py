@@ -4,7 +4,7 @@ An offset that is the same all through the log is how the units are mounted, or 
 of another datum. It is told and taken off; the filter is never blamed for it. A delay of its stamps likewise.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +27,7 @@ from groundstation.systems.trajectory.figures import offsets_m
 from groundstation.systems.trajectory.onboard_offsets import (
     Constant,
     PlaceOffset,
+    arm_by_turning,
     centre_of,
     constant_turn,
     euler_deg,
@@ -45,6 +46,7 @@ BIN_S, MOST_BINS = 1.0, 20_000  # errors are judged and shown as medians over it
 FEWEST = 30  # samples beside the track
 RATE_S = 0.1  # half the time over which rates are taken
 SHIFT_STEPS, MOST_SHIFT_S = 4, 1.0
+OPPOSITE = -0.8  # correlation with ours below which the sign of a velocity is the other one
 STEEP_DEG = 80.0  # pitch beyond which roll and heading say little
 ANGLES: tuple[Quantity, ...] = ("roll", "pitch", "heading")
 NOTHING = Constant(0.0, 0.0)
@@ -115,11 +117,12 @@ def compare_onboard(track: TrackOfStates, flight: Flight, topic: str) -> Compare
     output, track = _output(flight, topic), every(track, STATE_STEP_S)
     if output is None or np.isfinite(at_times(track, output.time_s).heading_deg).sum() < FEWEST:
         return None
+    output, is_upward = _with_down(output, at_times(track, output.time_s).velocity_mps[:, 2])
     delay = _delay(track, output)
     found = _errors(track, output, delay.value if delay.is_told else 0.0)
     bins = _Bins(output.time_s)
     figure = _figure(found, output, bins)
-    rows = tuple(_rows(found, figure, bins))
+    rows = tuple(_rows(found, figure, bins, UPWARD if is_upward else _Told()))
     if not rows:
         return None
     is_seen = np.isfinite(delay.sigma)
@@ -150,6 +153,17 @@ def _output(flight: Flight, topic: str) -> _Output | None:
         height,
         np.column_stack([table.values(f"position_{axis}_m") for axis in ("north", "east")]),
     )
+
+
+def _with_down(output: _Output, down_mps: FloatArray) -> tuple[_Output, bool]:
+    """Return the output with its velocity downward, and whether it logs it upward."""
+    theirs = output.velocity_mps[:, 2]
+    known = np.isfinite(theirs) & np.isfinite(down_mps)
+    if known.sum() < FEWEST or not np.std(down_mps[known]) * np.std(theirs[known]) > 0.0:
+        return output, False
+    if np.corrcoef(theirs[known], down_mps[known])[0, 1] > OPPOSITE:
+        return output, False
+    return replace(output, velocity_mps=output.velocity_mps * np.array([1.0, 1.0, -1.0])), True
 
 
 def _delay(track: TrackOfStates, output: _Output) -> Constant:
@@ -212,10 +226,11 @@ def _errors(track: TrackOfStates, output: _Output, delay_s: float) -> _Errors:
     at_s = output.time_s - delay_s
     ours, length_s = at_times(track, at_s), float(at_s[-1] - at_s[0])
     attitude, offsets = _attitude(output, ours, length_s)
-    plane, place = _plane(output, ours, length_s)
     before, after = (at_times(track, at_s + part).heading_deg for part in (-RATE_S, RATE_S))
-    swing = _swing_mps(place, ours.heading_deg, np.deg2rad(wrap_180(after - before)) / (2.0 * RATE_S))
+    rate = np.deg2rad(wrap_180(after - before)) / (2.0 * RATE_S)
     velocity = output.velocity_mps - ours.velocity_mps
+    plane, place = _plane(output, ours, length_s, arm_by_turning(velocity[:, :2], ours.heading_deg, rate))
+    swing = _swing_mps(place, ours.heading_deg, rate)
     velocity[:, :2] -= np.where(np.isfinite(swing), swing, 0.0)
     height = output.height_m - ours.height_m
     level = centre_of(height, ours.position_sigma_m[:, 2], length_s)
@@ -240,7 +255,9 @@ def _attitude(
     return error - np.array([one.value for one in found]), (roll, pitch, heading)
 
 
-def _plane(output: _Output, ours: TrackOfStates, length_s: float) -> tuple[FloatArray, PlaceOffset]:
+def _plane(
+    output: _Output, ours: TrackOfStates, length_s: float, arm: tuple[Constant, Constant]
+) -> tuple[FloatArray, PlaceOffset]:
     """Return errors north and east, and what was constant in them."""
     if np.isfinite(output.latitude_deg).any():
         theirs = (output.latitude_deg, output.longitude_deg, output.height_m)
@@ -250,7 +267,7 @@ def _plane(output: _Output, ours: TrackOfStates, length_s: float) -> tuple[Float
         origin = (float(ours.latitude_deg[first]), float(ours.longitude_deg[first]))
         error = output.plane_m - np.column_stack(north_east_m(ours.latitude_deg, ours.longitude_deg, *origin))
     sigma = np.hypot(ours.position_sigma_m[:, 0], ours.position_sigma_m[:, 1]) / 2.0**0.5
-    place = place_offset(error, ours.heading_deg, sigma, length_s)
+    place = place_offset(error, ours.heading_deg, sigma, length_s, arm)
     return error - place.fitted, place
 
 
@@ -321,7 +338,10 @@ class _Told(NamedTuple):
     words: str = ""
 
 
-def _rows(found: _Errors, figure: TrajectoryOnboard, bins: _Bins) -> list[OnboardError]:
+UPWARD = _Told(cause="sign", words="logged with the other sign: up, not down")
+
+
+def _rows(found: _Errors, figure: TrajectoryOnboard, bins: _Bins, down: _Told) -> list[OnboardError]:
     ours = found.ours
     rows: list[OnboardError | None] = []
     binned = ((figure.roll_deg, figure.roll_sigma_deg), (figure.pitch_deg, figure.pitch_sigma_deg))
@@ -337,9 +357,9 @@ def _rows(found: _Errors, figure: TrajectoryOnboard, bins: _Bins) -> list[Onboar
     )
     own = np.hypot(ours.velocity_sigma_mps[:, 0], ours.velocity_sigma_mps[:, 1])
     rows.append(_row("horizontal velocity", found.velocity_mps[:, :2], own, _Told(), plane, bins))
-    down = (figure.velocity_down_mps, figure.vertical_velocity_sigma_mps)
+    climb = (figure.velocity_down_mps, figure.vertical_velocity_sigma_mps)
     own = ours.velocity_sigma_mps[:, 2]
-    rows.append(_row("vertical velocity", found.velocity_mps[:, 2], own, _Told(), down, bins))
+    rows.append(_row("vertical velocity", found.velocity_mps[:, 2], own, down, climb, bins))
     place = (np.column_stack([figure.position_north_m, figure.position_east_m]), figure.horizontal_position_sigma_m)
     own = np.hypot(ours.position_sigma_m[:, 0], ours.position_sigma_m[:, 1])
     rows.append(_row("horizontal position", found.plane_m, own, _told_place(found.place), place, bins))

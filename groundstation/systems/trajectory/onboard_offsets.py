@@ -16,6 +16,8 @@ OWN_S = 60.0  # errors of the smoothed solution last so long
 TUKEY = 4.685  # sigmas from which an error has no weight
 STEPS = 8
 ARM_SIGMA_M, DATUM_SIGMA_M = 30.0, 1000.0  # priors of an antenna's place on the vehicle, and of another datum
+ARM_FLOOR_M = 0.03  # what the velocities of one filter may be apart from its attitude by
+FEWEST = 30
 TURNED = 0.7  # mean of the headings as unit vectors: above it the vehicle has not turned enough
 LEAST_SCALE = 1e-9
 
@@ -84,25 +86,45 @@ def euler_deg(n_from_b: FloatArray) -> FloatArray:
     return np.asarray(np.rad2deg(np.column_stack([roll, pitch, heading])))
 
 
-def place_offset(error_m: FloatArray, heading_deg: FloatArray, own_sigma_m: FloatArray, length_s: float) -> PlaceOffset:
+def arm_by_turning(error_mps: FloatArray, heading_deg: FloatArray, rate_radps: FloatArray) -> tuple[Constant, Constant]:
+    """Return the place on the vehicle, forward and right, that its turning shows."""
+    known = np.isfinite(error_mps).all(axis=1) & np.isfinite(heading_deg) & np.isfinite(rate_radps)
+    if known.sum() < FEWEST:
+        return Constant(0.0, ARM_SIGMA_M), Constant(0.0, ARM_SIGMA_M)
+    heading, rate = np.deg2rad(heading_deg[known]), rate_radps[known]
+    sin, cos = rate * np.sin(heading), rate * np.cos(heading)
+    design = np.array([[-sin, -cos], [cos, -sin]]).transpose(2, 0, 1)
+    solved, covariance = _robust_fit(design, error_mps[known], np.full(2, ARM_SIGMA_M), np.zeros(2))
+    forward, right = np.sqrt(np.diag(covariance) + ARM_FLOOR_M**2)
+    return Constant(float(solved[0]), float(forward)), Constant(float(solved[1]), float(right))
+
+
+def place_offset(
+    error_m: FloatArray,
+    heading_deg: FloatArray,
+    own_sigma_m: FloatArray,
+    length_s: float,
+    arm: tuple[Constant, Constant],
+) -> PlaceOffset:
     """Fit a constant place on the vehicle and one on the earth to errors, shape (n, 2).
 
-    The latter is left out where the vehicle has not turned: the two are then the same.
+    ``arm`` is what velocities already say of the former. The latter is left out where the vehicle has not turned: the
+    two are then the same.
     """
     known = np.isfinite(error_m).all(axis=1) & np.isfinite(heading_deg)
     heading = np.deg2rad(heading_deg[known])
     sin, cos, one, none = np.sin(heading), np.cos(heading), np.ones(len(heading)), np.zeros(len(heading))
     design = np.array([[cos, -sin, one, none], [sin, cos, none, one]]).transpose(2, 0, 1)
     has_turned = len(heading) > 0 and np.hypot(sin.mean(), cos.mean()) < TURNED
-    prior = np.array([ARM_SIGMA_M, ARM_SIGMA_M, DATUM_SIGMA_M, DATUM_SIGMA_M])
+    prior = np.array([arm[0].sigma, arm[1].sigma, DATUM_SIGMA_M, DATUM_SIGMA_M])
     prior[2:] = prior[2:] if has_turned else LEAST_SCALE
     error = error_m[known]
     if not len(error):
         nothing = Constant(0.0, float("inf"))
         return PlaceOffset(nothing, nothing, nothing, nothing, np.zeros_like(error_m))
-    solved, covariance = _robust_fit(design, error, prior)
+    solved, covariance = _robust_fit(design, error, prior, np.array([arm[0].value, arm[1].value, 0.0, 0.0]))
     own = np.nanmedian(own_sigma_m[known] ** 2) / max(length_s / OWN_S, 1.0)
-    sigma = np.sqrt(np.diag(covariance) + own * (prior > LEAST_SCALE))
+    sigma = np.sqrt(np.minimum(np.diag(covariance) + own, prior**2))
     full = np.deg2rad(np.nan_to_num(heading_deg))
     fitted = np.column_stack(
         [
@@ -143,7 +165,9 @@ def time_shift(error: FloatArray, slope: FloatArray) -> Constant:
     return Constant(delay, _sigma_of_mean(score) * len(score) / float(np.sum(weight * rates**2)))
 
 
-def _robust_fit(design: FloatArray, error: FloatArray, prior_sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _robust_fit(
+    design: FloatArray, error: FloatArray, prior_sigma: FloatArray, prior_mean: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Return the constants and their covariance; design (n, 2, q), error (n, 2)."""
     rest = error - np.median(error, axis=0)
     prior, scale, solved = np.diag(prior_sigma**-2.0), 1.0, np.zeros(design.shape[2])
@@ -153,7 +177,8 @@ def _robust_fit(design: FloatArray, error: FloatArray, prior_sigma: FloatArray) 
         scale = max(float(np.median(size)) / 1.1774, LEAST_SCALE)  # the median of a vector's length in sigmas
         weight = _tukey(size / scale) if step else np.where(size <= 3.0 * scale, 1.0, 0.0)
         normal = np.einsum("n,nij,nik->jk", weight, design, design) + prior * scale**2
-        solved = np.linalg.solve(normal, np.einsum("n,nij,ni->j", weight, design, error))
+        right = np.einsum("n,nij,ni->j", weight, design, error) + prior @ prior_mean * scale**2
+        solved = np.linalg.solve(normal, right)
         rest = error - design @ solved
     clipped = np.clip(rest, -TUKEY * scale, TUKEY * scale)
     repeats = max(len(error) / min(effective_samples(one) for one in clipped.T), 1.0)

@@ -45,7 +45,7 @@ def onboard_motion(results: FlightResults) -> Plot | None:
         ("east, m", data.position_east_m, place),
         ("height, m", data.height_m, data.vertical_position_sigma_m),
     )
-    return _errors(data, shown, "motion", "Errors of the on-board filter: velocity, place", 19.0)
+    return _errors(data, shown, "motion", "Errors of the on-board filter: velocity, place", 24.0)
 
 
 def _errors(

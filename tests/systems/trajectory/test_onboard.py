@@ -131,6 +131,14 @@ def test_a_place_from_an_unknown_origin_is_compared() -> None:
     assert found.offset_cause == "datum" and found.offset == pytest.approx(500.0, rel=0.02)
 
 
+def test_a_vertical_velocity_with_the_other_sign_is_told_and_no_error() -> None:
+    up = -onboard(TRACK)["ins"].values("velocity_down_mps")
+    found = row(compared(onboard(TRACK, velocity_down_mps=up)).errors, "vertical velocity")
+    assert found.offset_cause == "sign" and "up, not down" in found.offset_words
+    assert found.offset is None and found.spans == () and found.rms < 0.05
+    assert row(compared(onboard(TRACK)).errors, "vertical velocity").offset_cause == ""
+
+
 def test_a_place_that_is_no_fix_is_no_error() -> None:
     flight = onboard(TRACK)
     late = flight.time_s("ins") > 60.0
