@@ -1,13 +1,14 @@
 """The trajectory's filter against pyins's feedback filter and INSLIB's C filter, on simulated logs with known truth.
 
 All sides get the same increments, fixes, lever arm, start with the same errors, and noise of the unit's class. pyins
-and ours estimate position, velocity, attitude, biases, scale factors and misalignments (33 states), INSLIB position to
+and ours estimate position, velocity, attitude, biases, scale factors and misalignments (30 states), INSLIB position to
 biases (15). They take turns, warm, and figures are processor seconds, best of several rounds (pyins on an excerpt);
 INSLIB is called from a compiled loop, so that no Python is timed. "smoothed" is our filter with its smoother, "again" a
 further pass about what was smoothed.
 
 Errors are those of whole logs, once a second in their second half (pyins, which takes minutes, on the first log alone).
-"squares" is the mean of squared errors over the variance that the filter states, 1 where its sigmas hold.
+"squares" is the mean of squared errors over the variance that the filter states, 1 where its sigmas hold. Attitude is
+that of the accelerometer's axes, made square.
 
 Peers: ``pip install python-ins inslib`` (INSLIB is under the AGPL: for this comparison alone).
 """
@@ -31,6 +32,7 @@ from pyins.filters import run_feedback_filter  # noqa: E402
 from pyins.inertial_sensor import EstimationModel  # noqa: E402
 from pyins.measurements import NedVelocity, Position  # noqa: E402
 from pyins.strapdown import compute_increments_from_imu  # noqa: E402
+from scipy.linalg import rq  # noqa: E402
 
 from groundstation.base.angles import wrap_180  # noqa: E402
 from groundstation.base.attitude import rotation_n_from_b  # noqa: E402
@@ -169,9 +171,9 @@ def _noise_of(of: ImuClass) -> tuple[float, ...]:
         of.gyro_random_dph * dph * np.sqrt(2.0 / of.gyro_correlation_s),
         of.accelerometer_random_ug * micro_g * np.sqrt(2.0 / of.accelerometer_correlation_s),
         1e-6 * of.gyro_scale_factor_ppm,
-        1e-6 * of.gyro_cross_axis_ppm,
+        1e-6 * np.hypot(of.gyro_cross_axis_ppm, of.accelerometer_cross_axis_ppm),  # against the accelerometer's axes
         1e-6 * of.accelerometer_scale_factor_ppm,
-        1e-6 * of.accelerometer_cross_axis_ppm,
+        1e-6 * of.accelerometer_cross_axis_ppm * np.sqrt(2.0),  # of two axes against each other
     )
 
 
@@ -194,7 +196,7 @@ def by_pyins(of: Given) -> Side:
     is_axis = np.eye(3, dtype=bool)
     cross = np.where(is_axis, of.scale, of.misalignment)
     gyro = EstimationModel(of.gyro_bias, of.gyro_noise, of.gyro_walk, cross)
-    cross = np.where(is_axis, of.accelerometer_scale, of.accelerometer_misalignment)
+    cross = np.triu(np.where(is_axis, of.accelerometer_scale, of.accelerometer_misalignment))
     accelerometer = EstimationModel(of.accelerometer_bias, of.accelerometer_noise, of.accelerometer_walk, cross)
     seen = [
         Position(fixes, POSITION_SIGMA_M, flight.lever_arm_m),
@@ -398,7 +400,7 @@ def prepared(of: Given) -> OurPass:
         gyro_scale=of.scale,
         misalignment_deg=float(np.degrees(of.misalignment)),
         accel_scale=of.accelerometer_scale,
-        accel_misalignment_deg=float(np.degrees(of.accelerometer_misalignment)),
+        accel_square_deg=float(np.degrees(of.accelerometer_misalignment)),
         lever_m=0.0,
     )
     variances = sigmas.variances(noise, model, has_latency=False, has_slip=False, has_baro=False)
@@ -458,12 +460,26 @@ def by_us_again(of: Given) -> Side:
     return Side(lambda: _again(run, first), lambda: _judged(of, run, _again(run, _again(run, first)), smoothed_track))
 
 
+def _square_axes(matrix: Array) -> Array:
+    """Turn to the accelerometer's axes, made square, from those of the case: what no filter can tell apart."""
+    upper, turn = rq(np.eye(3) + matrix)
+    return np.asarray(np.sign(np.diag(upper))[:, None] * turn)
+
+
+def _angles_deg(n_from_b: Array) -> Array:
+    """Roll, pitch and heading of rotations, shape (k, 3)."""
+    roll = np.arctan2(n_from_b[:, 2, 1], n_from_b[:, 2, 2])
+    heading = np.arctan2(n_from_b[:, 1, 0], n_from_b[:, 0, 0])
+    return np.degrees(np.stack([roll, -np.arcsin(n_from_b[:, 2, 0]), heading], axis=1))
+
+
 def errors_of(of: Given, found: Found) -> Array:
     """Errors at the judged samples, shape (k, 9): m north, east, down; m/s; deg."""
     flight, at = of.flight, judged_at(of)
     meridian, normal = curvature_radii_m(flight.latitude_deg[at])
     parallel = (normal + flight.height_m[at]) * np.cos(np.radians(flight.latitude_deg[at]))
-    truth = np.stack([flight.roll_deg[at], flight.pitch_deg[at], flight.heading_deg[at]], axis=1)
+    body = np.stack([flight.roll_deg[at], flight.pitch_deg[at], flight.heading_deg[at]], axis=1)
+    truth = _angles_deg(rotation_n_from_b(body) @ _square_axes(flight.accelerometer_matrix).T)
     place = [
         np.radians(found.place[:, 0] - flight.latitude_deg[at]) * (meridian + flight.height_m[at]),
         np.radians(found.place[:, 1] - flight.longitude_deg[at]) * parallel,
