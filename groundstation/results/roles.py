@@ -282,6 +282,13 @@ class StatesAlongTheFlight:
         """Delay of the receiver behind the inertial unit and its sigma, s; None where it is not observable."""
         raise NotImplementedError
 
+    def velocity_latency(self, ins_topic: str) -> tuple[float, float] | None:
+        """Return the delay of GNSS velocities behind the output of an INS and its sigma, s.
+
+        None where the log does not show it.
+        """
+        raise NotImplementedError
+
     @property
     def antenna_arm_m(self) -> tuple[float, float, float]:
         """Antenna from the point of the states: forward, right, down; 0 where it is not observable."""
