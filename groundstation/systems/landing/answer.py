@@ -50,7 +50,7 @@ class RunwayUsed:
 
 @dataclass(frozen=True, kw_only=True)
 class TouchdownByStates:
-    """Touchdown by an estimate of position and velocity from raw inertial data, at the same time.
+    """Touchdown by states from raw inertial data, at the same time.
 
     Parameters
     ----------

@@ -37,7 +37,10 @@ def touchdown_of(
     relative: RelativeToRunway,
     estimated: StatesAlongTheFlight | None = None,
 ) -> Touchdown:
-    """Measure the touchdown that a final ends in, also by the states of an estimate whose checks hold."""
+    """Measure the touchdown that a final ends in.
+
+    It is also told by the states of an estimate whose checks hold.
+    """
     at_s = final.end.time_s
     places = path.latitude_deg, continuous_longitude_deg(path.longitude_deg)
     latitude, longitude = (float(np.interp(at_s, path.time_s, one)) for one in places)

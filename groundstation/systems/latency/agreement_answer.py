@@ -1,4 +1,4 @@
-"""Latency of GNSS by motion beside that by the turns of the taxi, and that of the best trajectory."""
+"""Latency of GNSS by motion beside other ways: turns of the taxi, best trajectory."""
 
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.results.agreement import Agreement, OneFinding

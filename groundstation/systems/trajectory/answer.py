@@ -460,7 +460,10 @@ class BestTrajectory(Answer, StatesAlongTheFlight):
 
     @property
     def gnss_latency(self) -> tuple[float, float] | None:
-        """Delay of the receiver behind the inertial unit and its sigma, s; None where it is not observable."""
+        """Delay of the receiver behind the inertial unit and its sigma, s.
+
+        None where it is not observable.
+        """
         found = self.parameter(LATENCY)
         return None if found is None or not found.is_observable else (found.value, found.sigma)
 
