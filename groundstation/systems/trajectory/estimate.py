@@ -79,6 +79,11 @@ class Problem:
         """Return the epochs and the measurements with the variances of a model."""
         return lay_out(self.samples, model.weighted(self.seen), self.begin_s, self.latency_s, self.lag_s)
 
+    def reweighted(self, plan: Plan, model: Model) -> Plan:
+        """Return a plan of this problem with the variances of another model."""
+        variance = np.ascontiguousarray(model.weighted(self.seen).variance[plan.order])
+        return replace(plan, seen=plan.seen._replace(variance=variance))
+
     def noise(self, model: Model) -> Noise:
         """Return a model's numbers as the loops take them."""
         return model.noise(self.sigma_m)
@@ -253,7 +258,7 @@ def fitted(problem: Problem, model: Model, rules: Gate, done: Pass, numbers: tup
     end = int(np.searchsorted(done.plan.epoch_s, last_s))
 
     def likelihood(at: Model) -> float:
-        plan = problem.plan(at)
+        plan = problem.reweighted(done.plan, at)
         start = problem.restarted(done.begun, at)
         return likelihood_of(problem.samples, plan, problem.noise(at), rules, start, done.linear, end)
 
