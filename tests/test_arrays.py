@@ -39,6 +39,7 @@ OPTIONAL = {
     },
     "forecast_growth": {"sigma_m"},
     "phases": {"proven"},
+    "trajectory_states": {"altitude_ellipsoid_m", "altitude_msl_m"},  # one of them, by the datum of GNSS
     "trajectory_track": {"other_heading_deg"},
 }
 BY_TEXT = {"numbers", "flags", "texts", "figure_with_rows"}

@@ -302,12 +302,14 @@ def load_configuration(
 
 def _left_out(listed: Any, given: Iterable[str] | None, name: str) -> tuple[str, ...]:
     """Return the names of the analyses that are left out, of a settings file and of the command line."""
-    from groundstation.systems import systems
-
     if not isinstance(listed, list) or not all(isinstance(one, str) for one in listed):
         raise SettingsError(f"{name}, without", repr(listed), "a list of names of analyses")
-    known = [analysis.name for analysis in systems().analyses]
     found = tuple(dict.fromkeys([*listed, *(given or ())]))
+    if not found:
+        return ()
+    from groundstation.systems import systems
+
+    known = [analysis.name for analysis in systems().analyses]
     for one in found:
         if one not in known:
             raise SettingsError("without", repr(one), f"one of {', '.join(known)}")

@@ -1,4 +1,7 @@
-"""Checks of an estimate on its own log: innovations, GNSS held out, heading against the track."""
+"""Checks of an estimate on its own log.
+
+They are innovations, GNSS held out, and the heading against the track.
+"""
 
 import numpy as np
 
@@ -101,7 +104,10 @@ def held_out(estimate: Estimate) -> tuple[HeldOutRow, ...]:
 
 
 def against_own_track(track: TrackOfStates) -> AgainstOwnTrack | None:
-    """Return how the heading stands to the track on straights, its mean apart; None where there are none."""
+    """Return how the heading stands to the track on straights, its mean apart.
+
+    None where there are no straights.
+    """
     speed = np.linalg.norm(track.velocity_mps[:, :2], axis=1)
     straight = (speed > 2.0 * FASTER_MPS) & (np.abs(turn_rate_dps(track)) < STRAIGHT_DPS)
     if straight.sum() < LEAST_IN_BLOCK:

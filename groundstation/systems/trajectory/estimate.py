@@ -1,4 +1,7 @@
-"""Estimate of a trajectory: start, latency, noise, slip, and the smoothed passes of one segment."""
+"""Estimate of the trajectory of one segment.
+
+It goes from start, latency, noise and slip to the smoothed passes.
+"""
 
 from dataclasses import dataclass, field, replace
 
@@ -62,7 +65,10 @@ SAME_HEADING_DEG = 10.0
 
 @dataclass(frozen=True)
 class Problem:
-    """What a segment is estimated from; ``sigma_m`` (3,) is the median of the stated position sigmas."""
+    """Input of the estimate of a segment.
+
+    ``sigma_m`` (3,) is the median of the stated position sigmas.
+    """
 
     samples: Samples
     gnss: GnssFixes
@@ -148,7 +154,10 @@ def pose(imu: ImuIncrements, gnss: GnssFixes, *, may_stop: bool) -> Problem:
 
 
 def hypotheses_of(problem: Problem, model: Model, rules: Gate) -> tuple[Hypothesis, ...]:
-    """Return the heading hypotheses by likelihood, the best first; those that became one are one."""
+    """Return the heading hypotheses by likelihood, the best first.
+
+    Those that became one are one.
+    """
     plan, noise = problem.plan(model), problem.noise(model)
     starts = starts_at(
         problem.samples,
@@ -253,7 +262,10 @@ def relinearised(problem: Problem, model: Model, rules: Gate, done: Pass, rounds
 
 
 def fitted(problem: Problem, model: Model, rules: Gate, done: Pass, numbers: tuple[Number, ...] = NUMBERS) -> Fit:
-    """Fit the numbers of the model to the first part of the log that moves, about the line of a pass."""
+    """Fit the numbers of the model to the first part of the log that moves.
+
+    The log is linearised about the line of a pass.
+    """
     last_s = _first_motion_s(problem.gnss, problem.begin_s) + FIT_S
     end = int(np.searchsorted(done.plan.epoch_s, last_s))
 
@@ -330,7 +342,10 @@ def estimate(
 
 
 def _without_slip(problem: Problem) -> Problem:
-    """Return the problem without what was learned of the direction of travel: it would favour the heading it is of."""
+    """Return the problem without what was learned of the direction of travel.
+
+    It would favour the heading that it is of.
+    """
     return replace(problem, seen=problem.seen.take(problem.seen.kind != NO_SLIP), has_slip=False)
 
 

@@ -91,7 +91,10 @@ def track_figure(track: TrackOfStates, other_heading_deg: FloatArray | None = No
 
 
 def states_of(track: TrackOfStates, height: str) -> BodyStates:
-    """Return every state of a track; ``height`` is the datum of its heights: ellipsoid, msl, or empty."""
+    """Return every state of a track.
+
+    ``height`` is the datum of its heights: ellipsoid, msl, or empty.
+    """
     position, velocity, attitude = track.position_sigma_m, track.velocity_sigma_mps, track.attitude_sigma_deg
     return BodyStates(
         time_s=track.time_s,

@@ -19,7 +19,10 @@ from groundstation.systems.trajectory.states import FloatArray
 
 @dataclass(frozen=True)
 class Number:
-    """Number of the model that is fitted: its name, sigma of the prior's logarithm, bounds as factors of the prior."""
+    """Number of the model that is fitted.
+
+    It has its name, the sigma of the prior's logarithm, and bounds as factors of the prior.
+    """
 
     name: str
     spread: float
@@ -47,7 +50,10 @@ SWEEPS = 4
 
 @dataclass(frozen=True)
 class Fit:
-    """Fitted model, penalised log-likelihood, evaluations, and the numbers that stand at a bound."""
+    """Fitted model, with its penalised log-likelihood.
+
+    ``at_bound`` names the numbers that stand at a bound.
+    """
 
     model: Model
     value: float
@@ -98,7 +104,10 @@ def fit_model(prior: Model, likelihood: Callable[[Model], float], numbers: tuple
 def _along(
     value_of: Callable[[FloatArray], float], logs: FloatArray, i: int, step: float, low: float, high: float, best: float
 ) -> tuple[float, FloatArray, bool]:
-    """Walk along one number while it gets better, then to the top of the parabola through the last three."""
+    """Walk along one number while it gets better.
+
+    The last step goes to the top of the parabola through the last three.
+    """
 
     def at(number: float) -> FloatArray:
         moved = logs.copy()

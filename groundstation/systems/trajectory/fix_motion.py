@@ -1,4 +1,4 @@
-"""Motion that fixes show: their velocity, or the change of their place where they have none."""
+"""Motion that fixes show: their velocity, or the change of their place."""
 
 import numpy as np
 
@@ -11,7 +11,9 @@ LONGEST_S = 10.0
 
 
 def motion_of(gnss: GnssFixes) -> FloatArray:
-    """Return the velocity of the antenna at each fix, north, east, down, shape (m, 3); NaN where nothing shows it.
+    """Return the velocity of the antenna at each fix, north, east, down, shape (m, 3).
+
+    NaN where nothing shows it.
 
     Where a receiver logs no velocity it is the slope of the places over four seconds; a missing vertical velocity is 0.
     """

@@ -61,7 +61,10 @@ BLOCK = 9 * LEV  # entries of the navigation rows of the transition
 
 @in_place
 def carry(e: int, first: int, last: int, imu: Imu, noise: Noise, now: Now, room: Room, linear: Linear) -> None:
-    """Carry the estimate over samples ``first`` to ``last`` (not included) and fill the transition of epoch e."""
+    """Carry the estimate over samples and fill the transition of epoch e.
+
+    The samples are ``first`` to before ``last``.
+    """
     value, nav, step, spent = now.value, now.nav, room.step, linear.spent
     begin_transition(room.grown)
     turn = room.y
@@ -197,7 +200,7 @@ def update(
 
 @in_place
 def close(e: int, line: Line, now: Now, room: Room, linear: Linear) -> None:
-    """Put the corrections of an epoch into the estimate, or bring it back to the line of linearisation.
+    """Put the corrections of an epoch into the estimate, or bring it back to the line.
 
     What the estimate is moved by goes to ``linear.closed``.
     """
@@ -259,7 +262,7 @@ def run_forward(
     linear: Linear,
     solved: Solved,
 ) -> float:
-    """Filter epochs ``begin`` to ``end`` (not included); return the logarithm of the likelihood.
+    """Filter epochs from ``begin`` to before ``end``; return the log-likelihood.
 
     Parameters
     ----------

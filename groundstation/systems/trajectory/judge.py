@@ -26,7 +26,10 @@ class Factors:
 
 
 def position_factor(outages: Outages) -> float:
-    """Return the factor that puts 95 % of all outages inside, and 90 % of each length that has ten."""
+    """Return the factor that puts 95 % of all outages inside.
+
+    Of each length that has ten it puts 90 % inside.
+    """
     if len(outages) < FEW:
         return 1.0
     factor = max(1.0, _quantile(outages.ratio, WANTED))

@@ -1,4 +1,4 @@
-"""Numbers of the model: noise of the unit by class, errors of GNSS, sigmas of the constants at the start."""
+"""Numbers of the model: noise of the unit, errors of GNSS, sigmas at the start."""
 
 from dataclasses import dataclass, fields, replace
 
@@ -86,7 +86,10 @@ class Model:
     accel_imperfection: float = 1.0
 
     def noise(self, sigma_m: FloatArray) -> Noise:
-        """Return the numbers as the loops take them; ``sigma_m`` (3,) is the median of the stated sigmas."""
+        """Return the numbers as the loops take them.
+
+        ``sigma_m`` (3,) is the median of the stated sigmas.
+        """
         root = np.sqrt(HOUR)
         return Noise(
             np.array(
@@ -137,7 +140,10 @@ class StartSigmas:
     mounting_deg: float = 5.0
 
     def variances(self, noise: Noise, model: Model, *, has_latency: bool, has_slip: bool, has_baro: bool) -> FloatArray:
-        """Return the variances of the states from BG on, shape (STATES,); those of navigation are zero."""
+        """Return the variances of the states from BG on, shape (STATES,).
+
+        Those of navigation are zero.
+        """
         v = np.zeros(STATES)
         v[BG : BG + 3] = (self.gyro_bias_dps * DEG) ** 2
         v[BA : BA + 3] = (self.accel_bias_mg * 1e-3 * STANDARD_GRAVITY_MPS2) ** 2

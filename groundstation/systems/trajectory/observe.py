@@ -40,7 +40,9 @@ NO_ROW = 1e9  # innovation of a scalar that a measurement does not have
 
 @inlined
 def _arm(m: int, seen: Seen, now: Now, room: Room) -> None:
-    """Fill ``room.step``: arm of the antenna in n, its velocity beside the unit's, acceleration, rate in b.
+    """Fill ``room.step`` with the motion of the antenna beside the unit.
+
+    Arm in n, velocity beside the unit's, acceleration, rate in b.
 
     They stand at 16, 19, 22 and 25, three each; gravity at 15.
     """

@@ -1,4 +1,7 @@
-"""Outages of GNSS that are replayed on a log's own data: errors against the undisturbed solution, with their sigmas."""
+"""Outages of GNSS that are replayed on a log's own data.
+
+Errors are against the undisturbed solution, with their sigmas.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -111,7 +114,10 @@ def _valid_s(plan: Plan) -> FloatArray:
 
 
 def hidden(plan: Plan, windows: FloatArray) -> BoolArray:
-    """Tell which measurements are not there in outages: GNSS, and the standstill that it showed."""
+    """Tell which measurements are not there in outages.
+
+    GNSS, and the standstill that it showed.
+    """
     valid_s = _valid_s(plan)
     at = np.searchsorted(windows[:, 0], valid_s, side="right") - 1
     inside = (at >= 0) & (valid_s < windows[np.maximum(at, 0), 1])

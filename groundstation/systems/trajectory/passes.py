@@ -55,7 +55,10 @@ class Samples:
 
 
 def fill_gaps(imu: ImuIncrements) -> Samples:
-    """Return the increments with a made sample in each gap: the mean of its neighbours, opened by their spread."""
+    """Return the increments with a made sample in each gap.
+
+    It is the mean of its neighbours, opened by their spread.
+    """
     missing = np.diff(imu.time_s) - imu.interval_s[1:]
     at = np.flatnonzero(missing > GAP_SHARE * imu.interval_s[1:]) + 1
     gap_s = missing[at - 1]
@@ -79,7 +82,10 @@ def fill_gaps(imu: ImuIncrements) -> Samples:
 
 
 def means_about(samples: Samples, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return angular rate and specific force about each time, means over ``MEAN_S``, shapes (m, 3)."""
+    """Return angular rate and specific force about each time, shapes (m, 3).
+
+    They are means over ``MEAN_S``.
+    """
     ends = np.concatenate([[samples.begin_s], samples.time_s])
     lowest, highest = time_s - 0.5 * MEAN_S, time_s + 0.5 * MEAN_S
     at = [np.clip(np.searchsorted(ends, edge), 0, len(ends) - 1) for edge in (lowest, highest)]
@@ -96,7 +102,10 @@ def means_about(samples: Samples, time_s: FloatArray) -> tuple[FloatArray, Float
 
 @dataclass(frozen=True)
 class Plan:
-    """Epochs of a pass, and its measurements in their order; epoch 0 has no samples: it is the start."""
+    """Epochs of a pass, and its measurements in their order.
+
+    Epoch 0 has no samples: it is the start.
+    """
 
     schedule: Schedule
     seen: Seen
@@ -105,7 +114,10 @@ class Plan:
 
 
 def lay_out(samples: Samples, seen_at: Observations, begin_s: float, latency_s: float, lag_s: float = 0.0) -> Plan:
-    """Lay out the epochs from ``begin_s`` on; GNSS is shifted by its latency, its velocities by their lag as well."""
+    """Lay out the epochs from ``begin_s`` on.
+
+    GNSS is shifted by its latency, its velocities by their lag as well.
+    """
     first_sample = int(np.searchsorted(samples.time_s, begin_s, side="right"))
     start_s = samples.time_s[first_sample - 1] if first_sample else samples.begin_s
     late_s = latency_s + np.where(seen_at.kind == VELOCITY, lag_s, 0.0)
@@ -321,7 +333,10 @@ def run_pass(
 def likelihood_of(
     samples: Samples, plan: Plan, noise: Noise, gate: Gate, start: Start, known: Linear, end: int | None = None
 ) -> float:
-    """Return the logarithm of the likelihood of the epochs before ``end``, with a known linearisation."""
+    """Return the log-likelihood of the epochs before ``end``.
+
+    The linearisation is known.
+    """
     last = len(plan.epoch_s) if end is None else end
     return run_forward(
         samples.imu,
@@ -384,14 +399,20 @@ def line_of(one: Pass) -> Line:
 
 
 def at_line(start: Start, line: Line) -> Start:
-    """Return a start on a line; the prior of the constants stays where it was, that of navigation comes along."""
+    """Return a start on a line.
+
+    The prior of the constants stays where it was, that of navigation comes along.
+    """
     prior = start.value + start.prior - line.value[0]
     prior[:NAVIGATION] = 0.0
     return Start(line.nav[0].copy(), line.value[0].copy(), start.p, prior)
 
 
 def turned(quaternion: FloatArray, vector: FloatArray) -> FloatArray:
-    """Turn quaternions n from b (wxyz), shape (n, 4), by rotation vectors in n, shape (n, 3), rad."""
+    """Turn quaternions n from b (wxyz), shape (n, 4), by rotation vectors in n.
+
+    The vectors have shape (n, 3), rad.
+    """
     angle = np.linalg.norm(vector, axis=1)
     s = 0.5 * np.sinc(0.5 * angle / np.pi)
     c, (x, y, z) = np.cos(0.5 * angle), (vector * s[:, None]).T

@@ -210,7 +210,10 @@ def outages(results: FlightResults) -> Plot | None:
 
 
 def _side_by_side(length_s: Floats) -> Floats:
-    """Return the lengths, those of equal ones a little apart: dots above each other are told from one."""
+    """Return the lengths, equal ones a little apart.
+
+    Dots above each other are told from one.
+    """
     place = np.array(length_s)
     for one in np.unique(length_s):
         of = np.flatnonzero(length_s == one)

@@ -1,4 +1,7 @@
-"""Segments of a log: split at gaps of the unit, each estimated, the noise fitted to the longest."""
+"""Segments of a log, split at gaps of the unit.
+
+Each is estimated, the noise fitted to the longest.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -48,7 +51,10 @@ def moving_s(gnss: GnssFixes, start_s: float, end_s: float, moving_mps: float) -
 
 
 def of_segment(gnss: GnssFixes, imu: ImuIncrements) -> GnssFixes:
-    """Return the fixes beside a segment, a second and a half more on both sides for their latency."""
+    """Return the fixes beside a segment.
+
+    A second and a half is added on both sides for their latency.
+    """
     near = (gnss.time_s >= imu.time_s[0] - 1.5) & (gnss.time_s <= imu.time_s[-1] + 1.5)
     return GnssFixes(**{name: getattr(gnss, name)[near] for name in gnss.__dataclass_fields__})
 

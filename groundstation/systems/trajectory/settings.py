@@ -1,4 +1,4 @@
-"""Settings of the best trajectory: its input, its mounting, what is refused and what is doubtful."""
+"""Settings of the best trajectory: input, mounting, what is refused or doubtful."""
 
 from dataclasses import dataclass, field
 

@@ -1,4 +1,4 @@
-"""Direction of travel in the axes of the unit, and the observation that what rolls does not slip."""
+"""Direction of travel in the axes of the unit; what rolls does not slip."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,10 @@ TURN_ARM_M = 1.0  # the unit's unknown place ahead of the axle: it moves sideway
 
 @dataclass(frozen=True)
 class Travel:
-    """Direction of travel in the axes of the unit: yaw and pitch, rad, and their scatter, deg (MAD sigma)."""
+    """Direction of travel in the axes of the unit, and its scatter.
+
+    The scatter is the MAD sigma, deg.
+    """
 
     yaw_rad: float
     pitch_rad: float

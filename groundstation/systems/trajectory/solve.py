@@ -39,7 +39,10 @@ INS = "ins"
 
 @dataclass(frozen=True)
 class Solved:
-    """States of the smoother and of the filter, sigmas raised, for the analyses behind this one."""
+    """States of the smoother and of the filter, sigmas raised.
+
+    They are for the analyses behind this one.
+    """
 
     smoothed: TrackOfStates
     forward: TrackOfStates

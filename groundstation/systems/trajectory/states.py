@@ -97,7 +97,10 @@ class Seen(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """Numbers of the model: spectral densities of the unit's noise, and the Gauss-Markov processes."""
+    """Numbers of the model as the loops take them.
+
+    Spectral densities of the unit's noise, and the Gauss-Markov processes.
+    """
 
     density: FloatArray  # (6,) gyro rad2/s, accelerometer m2/s3, biases rad2/s3 and m2/s5, rate, slip angle rad2/s
     time_s: FloatArray  # (3,) correlation times: slow, fast, barometer

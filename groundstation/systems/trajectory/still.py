@@ -19,7 +19,10 @@ STILL_MPS, STILL_DPS = 0.02, 0.03
 
 
 def windows_of(samples: Samples) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return the middles of windows, mean rates and the spreads of rate and force in each, (w,), (w, 3), (w,), (w,)."""
+    """Return the middles of windows, mean rates, spreads of rate and of force.
+
+    Shapes (w,), (w, 3), (w,), (w,).
+    """
     number = np.floor((samples.time_s - samples.time_s[0]) / WINDOW_S).astype(np.int64)
     starts = np.flatnonzero(np.concatenate([[True], np.diff(number) > 0]))
     count = np.diff(np.append(starts, len(number)))[:, None]

@@ -1,4 +1,4 @@
-"""Compiled strapdown mechanisation in the local-level frame, and the transition of its errors.
+"""Compiled strapdown in the local-level frame, and the transition of its errors.
 
 Letters: C rotation n from b; a sample has angle and velocity increments; n is north, east, down.
 
@@ -66,7 +66,10 @@ def turn_before(nav: FloatArray, x: float, y: float, z: float) -> None:
 
 @inlined
 def turn_after(nav: FloatArray, x: float, y: float, z: float) -> None:
-    """Turn the attitude by a rotation vector in b: C becomes C exp([x, y, z]); its length is set to one."""
+    """Turn the attitude by a rotation vector in b: C becomes C exp([x, y, z]).
+
+    The length of the quaternion is set to one.
+    """
     angle = math.sqrt(x * x + y * y + z * z)
     s = 0.5 - angle * angle / 48.0
     if angle > 1e-3:
@@ -201,7 +204,10 @@ def _grow_column(grown: FloatArray, j: int, an: float, ae: float, ad: float, ste
 
 @inlined
 def _push_column(grown: FloatArray, j: int, n: float, e: float, d: float, dt: float) -> None:
-    """Let one error of the accelerometer, or of the attitude, act over a sample: it pushes by (n, e, d)."""
+    """Let an error of accelerometer or attitude act over a sample.
+
+    It pushes by (n, e, d).
+    """
     grown[0, j] += (grown[3, j] + 0.5 * n) * dt
     grown[1, j] += (grown[4, j] + 0.5 * e) * dt
     grown[2, j] += (grown[5, j] + 0.5 * d) * dt

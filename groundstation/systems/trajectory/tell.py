@@ -99,7 +99,7 @@ def parameter_rows(estimate: Estimate) -> tuple[TrajectoryParameter, ...]:
 
 
 def residuals_of(estimates: tuple[Estimate, ...]) -> TrajectoryResiduals:
-    """Return GNSS minus the smoothed solution at the antenna, with its errors that last taken for its own."""
+    """Return GNSS minus the smoothed solution at the antenna."""
     parts = []
     for one in estimates:
         parts.append(_residuals(one))

@@ -52,7 +52,7 @@ def forward_track(samples: Samples, one: Pass, at: Int64Array | None = None, *, 
 
 
 def _place(samples: Samples, one: Pass, at: Int64Array) -> tuple[Int64Array, FloatArray]:
-    """Return the epoch that each sample leads to, and how far between its start and end it is, shape (k, 1)."""
+    """Return the epoch that each sample leads to, and its place in it, shape (k, 1)."""
     epoch = np.searchsorted(one.plan.schedule.first[1:], at, side="right")
     start, end = one.plan.epoch_s[epoch - 1], one.plan.epoch_s[epoch]
     return epoch, ((samples.time_s[at] - start) / np.maximum(end - start, 1e-9))[:, None]
@@ -93,7 +93,10 @@ def angles_of(quaternion: FloatArray) -> tuple[FloatArray, FloatArray, FloatArra
 
 
 def _attitude_sigma(pitch: FloatArray, heading: FloatArray, variance: FloatArray) -> FloatArray:
-    """Return sigmas of roll, pitch and heading from the variances of the rotation vector in n, uncorrelated."""
+    """Return sigmas of roll, pitch and heading from those of the rotation vector in n.
+
+    Its parts are taken as uncorrelated.
+    """
     c, s = np.cos(heading) ** 2, np.sin(heading) ** 2
     along, across = c * variance[:, 0] + s * variance[:, 1], s * variance[:, 0] + c * variance[:, 1]
     level = np.maximum(np.cos(pitch), LEAST_LEVEL)

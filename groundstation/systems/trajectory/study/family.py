@@ -1,4 +1,7 @@
-"""Families of simulated logs that the trajectory estimator is judged on, and the model that knows their noise."""
+"""Families of simulated logs that the estimator is judged on.
+
+Each has the model that knows its noise.
+"""
 
 from dataclasses import dataclass, field
 
@@ -15,7 +18,10 @@ GAPS = (LogInterval(150.0, 150.4), LogInterval(260.0, 260.15))
 
 
 def _hard(imu_class: str) -> ImuSettings:
-    """Return a log with scale 0.5 %, misalignment 0.3 deg, jitter 3 ms, two gaps, latency 0.3 s."""
+    """Return a log with everything that is hard.
+
+    Scale 0.5 %, misalignment 0.3 deg, jitter 3 ms, two gaps, latency 0.3 s.
+    """
     return ImuSettings(
         duration_s=DURATION_S,
         imu_class=imu_class,

@@ -86,7 +86,10 @@ def estimated(flight: ImuFlight) -> Estimate:
 
 
 def squared_errors(flight: ImuFlight, track: TrackOfStates) -> tuple[FloatArray, FloatArray]:
-    """Return squared errors over variances, shape (k, 3, 3), and the errors of the heading in degrees."""
+    """Return squared errors over variances, shape (k, 3, 3).
+
+    The second result is the error of the heading in degrees.
+    """
     truth = true_states(flight.motion, track.time_s)
     north, east = curvature_radii_m(truth.latitude_deg)
     errors = np.empty((len(track), 3, 3))
