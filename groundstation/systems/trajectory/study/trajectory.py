@@ -1,4 +1,4 @@
-"""Monte Carlo study of the trajectory estimator: do errors and sigmas of filter and smoother agree?
+"""Monte Carlo study of the trajectory estimator: errors against sigmas.
 
 The families are written down in ``family``. The model knows the noise of the simulation, nothing is fitted and no gate
 scales a sigma: it is the estimator's equations that are judged.
@@ -56,7 +56,10 @@ def study_trajectory(
 
 
 def row_of(name: str, found: Sequence[Run | None]) -> dict[str, object]:
-    """Return the row of a family; NEES are per degree of freedom, 1 where the sigmas are right."""
+    """Return the row of a family.
+
+    NEES are per degree of freedom, 1 where the sigmas are right.
+    """
     done = [one for one in found if one is not None]
     row: dict[str, object] = {
         "family": name,
