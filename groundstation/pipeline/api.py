@@ -40,6 +40,7 @@ def open_flight(
     icd: AnyPath | Sequence[AnyPath] = (),
     thresholds: Settings | None = None,
     weather: Settings | None = None,
+    without: Sequence[str] = (),
 ) -> "OpenFlight":
     """Open a flight: a recorded log, an MCAP that groundstation wrote, or a flight folder.
 
@@ -54,6 +55,8 @@ def open_flight(
         Layout of a log that no reader knows.
     icd : str, Path or several of them, optional
         What the words of a recording's buses mean: files, or names of shipped ICDs.
+    without : sequence of str
+        Analyses to leave out.
 
     Returns
     -------
@@ -69,15 +72,15 @@ def open_flight(
     icds = tuple(str(one) for one in ([icd] if isinstance(icd, str | PathLike) else icd))
     given = {"config": config, "aircraft": aircraft, "site": site, "intervals": intervals, "thresholds": thresholds}
     given["weather"] = weather
-    files = {name: _file_or_content(value) for name, value in given.items()}
+    files: dict[str, Any] = {name: _file_or_content(value) for name, value in given.items()}
     with told_in_a_line(where.name):
         if not where.exists():
             raise UsageError(str(where), "no such file or folder")
         if where.is_dir():
-            if layout or icds or any(value is not None for value in given.values()):
+            if layout or icds or without or any(value is not None for value in given.values()):
                 raise UsageError(str(where), "settings for saved results", next_step="open it, then with_settings()")
             return SavedRun(_flight_folder(where))
-        configuration = load_configuration(profile=layout, icds=icds, **files)
+        configuration = load_configuration(profile=layout, icds=icds, without=without, **files)
         return OpenLog(Conversion(open_log(where, layout, icds)), configuration)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from groundstation.base.errors import NotAssessableError
 from groundstation.systems.trajectory import observations, slip, still
 from groundstation.systems.trajectory.fit import NUMBERS, Fit, Number, fit_model
 from groundstation.systems.trajectory.fix_motion import motion_of
@@ -141,10 +142,18 @@ class Estimate:
 
 
 def pose(imu: ImuIncrements, gnss: GnssFixes, *, may_stop: bool) -> Problem:
-    """Return the problem of a segment at latency zero."""
+    """Return the problem of a segment at latency zero.
+
+    Raises
+    ------
+    NotAssessableError
+        Without a fix in the span of the unit.
+    """
     samples = fill_gaps(imu)
     have = np.isfinite(gnss.latitude_deg) & np.isfinite(motion_of(gnss)[:, :2]).all(axis=1)
     inside = have & (gnss.time_s >= samples.begin_s) & (gnss.time_s < samples.time_s[-1])
+    if not inside.any():
+        raise NotAssessableError("trajectory", "no fix with a position and a velocity lies in the span of the unit")
     begin_s = float(gnss.time_s[inside][0])
     middle, stands, rate = still.still_windows(samples, gnss, 0.0, may_stop=may_stop)
     seen = observations.joined([observations.of_gnss(gnss), still.observations_of(middle, stands, rate)])

@@ -76,5 +76,8 @@ def of_gnss(gnss: GnssFixes) -> Observations:
 
 
 def _slope(time_s: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the rate of change of columns over time, 0 for a single row."""
-    return np.asarray(np.gradient(values, time_s, axis=0)) if len(time_s) > 1 else np.zeros_like(values)
+    """Return the rate of change of columns over time, 0 where there is one time only."""
+    times, first, place = np.unique(time_s, return_index=True, return_inverse=True)
+    if len(times) < 2:
+        return np.zeros_like(values)
+    return np.asarray(np.gradient(values[first], times, axis=0)[place])

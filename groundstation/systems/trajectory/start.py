@@ -85,9 +85,10 @@ def starts_at(
     force = samples.imu.velocity[window].sum(axis=0) / samples.imu.interval_s[window].sum()
     acceleration = np.zeros(3)
     if not is_still:
-        beside = fixes[np.abs(valid_s[fixes] - begin_s) <= max(2.5, 1.5 * float(np.median(np.diff(valid_s[fixes]))))]
-        if len(beside) >= 2:
-            t = valid_s[beside] - begin_s
+        apart_s = float(np.median(np.diff(valid_s[fixes]))) if len(fixes) > 1 else 0.0
+        beside = fixes[np.abs(valid_s[fixes] - begin_s) <= max(2.5, 1.5 * apart_s)]
+        t = valid_s[beside] - begin_s
+        if len(np.unique(t)) >= 2:
             acceleration = np.polyfit(t, motion[beside], 1)[0]
     p = np.diag(variances)
     sigma_m = np.nan_to_num(gnss.position_sigma_m[at], nan=10.0)

@@ -1,14 +1,15 @@
 """The best trajectory as one object."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from groundstation.systems.system import System, Tab
+from groundstation.systems.system import Study, System, Tab
 from groundstation.systems.trajectory.analysis import TRAJECTORY
 
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Chapter
     from groundstation.plots.plot import Describe
+    from groundstation.systems.study import StudyResult
 
 
 def _chapters() -> "tuple[Chapter, ...]":
@@ -31,4 +32,17 @@ def _tabs() -> tuple[Tab, ...]:
     return (Tab(("trajectory",), trajectory),)
 
 
-SYSTEM = System(name="trajectory", analyses=(TRAJECTORY,), chapters=_chapters, plots=_plots, tabs=_tabs)
+def _study() -> "Callable[..., StudyResult]":
+    from groundstation.systems.trajectory.study.trajectory import study_trajectory
+
+    return study_trajectory
+
+
+SYSTEM = System(
+    name="trajectory",
+    analyses=(TRAJECTORY,),
+    studies=(Study("trajectory", "best trajectory: errors of filter and smoother against their sigmas", _study),),
+    chapters=_chapters,
+    plots=_plots,
+    tabs=_tabs,
+)

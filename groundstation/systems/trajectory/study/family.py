@@ -1,7 +1,4 @@
-"""Families of simulated logs that the estimator is judged on.
-
-Each has the model that knows its noise.
-"""
+"""Families of simulated logs for the study, and the model that knows their noise."""
 
 from dataclasses import dataclass, field
 
@@ -18,10 +15,7 @@ GAPS = (LogInterval(150.0, 150.4), LogInterval(260.0, 260.15))
 
 
 def _hard(imu_class: str) -> ImuSettings:
-    """Return a log with everything that is hard.
-
-    Scale 0.5 %, misalignment 0.3 deg, jitter 3 ms, two gaps, latency 0.3 s.
-    """
+    """Return a log with scale 0.5 %, misalignment 0.3 deg, jitter, gaps, latency 0.3 s."""
     return ImuSettings(
         duration_s=DURATION_S,
         imu_class=imu_class,
@@ -81,7 +75,11 @@ def known_model(settings: ImuSettings) -> Model:
 
 
 def known_sigmas(settings: ImuSettings) -> StartSigmas:
-    """Return the sigmas of the constants of a simulated log."""
+    """Return the sigmas of the constants of a simulated log.
+
+    Half of what turns the accelerometers against each other is a rotation of all three: the attitude is theirs, and the
+    gyros are misaligned to them by so much more.
+    """
     unit, factor = load_imu_class(settings.imu_class), settings.error_factor
     gyro = float(np.hypot(unit.gyro_constant_dph, unit.gyro_random_dph)) / HOUR
     accel = float(np.hypot(unit.accelerometer_constant_ug, unit.accelerometer_random_ug)) * 1e-3
@@ -101,7 +99,7 @@ def known_sigmas(settings: ImuSettings) -> StartSigmas:
         gyro_bias_dps=factor * gyro,
         accel_bias_mg=factor * accel,
         gyro_scale=factor * float(ppm[0]),
-        misalignment_deg=factor * float(np.degrees(ppm[1])),
+        misalignment_deg=factor * float(np.degrees(np.hypot(ppm[1], ppm[3] * np.sqrt(0.5)))),
         accel_scale=factor * float(ppm[2]),
-        accel_misalignment_deg=factor * float(np.degrees(ppm[3])),
+        accel_square_deg=factor * float(np.degrees(ppm[3] * np.sqrt(0.5))),
     )

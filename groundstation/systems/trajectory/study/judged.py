@@ -11,6 +11,7 @@ from groundstation.simulation.imu.flight import ImuFlight, simulate_imu
 from groundstation.simulation.imu.motion import true_states
 from groundstation.systems.trajectory.estimate import Estimate, estimate
 from groundstation.systems.trajectory.inputs import FloatArray, GnssFixes, ImuIncrements
+from groundstation.systems.trajectory.onboard_offsets import euler_deg
 from groundstation.systems.trajectory.retime import on_a_line
 from groundstation.systems.trajectory.solution import TrackOfStates
 from groundstation.systems.trajectory.states import LAT
@@ -85,11 +86,17 @@ def estimated(flight: ImuFlight) -> Estimate:
     )
 
 
-def squared_errors(flight: ImuFlight, track: TrackOfStates) -> tuple[FloatArray, FloatArray]:
-    """Return squared errors over variances, shape (k, 3, 3).
+def accelerometers_from_body(flight: ImuFlight) -> FloatArray:
+    """Return the rotation of the accelerometers, made square, against the body.
 
-    The second result is the error of the heading in degrees.
+    The attitude is theirs. I + errors = symmetric times rotation (polar decomposition).
     """
+    left, _size, right = np.linalg.svd(np.eye(3) + flight.accelerometer_matrix)
+    return np.asarray(left @ right)
+
+
+def squared_errors(flight: ImuFlight, track: TrackOfStates) -> tuple[FloatArray, FloatArray]:
+    """Return squared errors over variances, shape (k, 3, 3), and heading errors in deg."""
     truth = true_states(flight.motion, track.time_s)
     north, east = curvature_radii_m(truth.latitude_deg)
     errors = np.empty((len(track), 3, 3))
@@ -98,8 +105,8 @@ def squared_errors(flight: ImuFlight, track: TrackOfStates) -> tuple[FloatArray,
     errors[:, 0, 1] = np.radians(wrap_180(track.longitude_deg - truth.longitude_deg)) * parallel
     errors[:, 0, 2] = truth.height_m - track.height_m
     errors[:, 1] = track.velocity_mps - truth.velocity_mps
-    for axis, name in enumerate(("roll_deg", "pitch_deg", "heading_deg")):
-        errors[:, 2, axis] = wrap_180(getattr(track, name) - getattr(truth, name))
+    found = np.stack([track.roll_deg, track.pitch_deg, track.heading_deg], axis=1)
+    errors[:, 2] = wrap_180(found - euler_deg(truth.n_from_b @ accelerometers_from_body(flight).T))
     sigmas = np.stack([track.position_sigma_m, track.velocity_sigma_mps, track.attitude_sigma_deg], axis=1)
     return (errors / sigmas) ** 2, errors[:, 2, 2]
 

@@ -1,6 +1,4 @@
-"""Monte Carlo study of the trajectory estimator.
-
-It asks whether errors and sigmas of filter and smoother agree.
+"""Monte Carlo study of the trajectory estimator: errors against sigmas.
 
 The families are written down in ``family``. The model knows the noise of the simulation, nothing is fitted and no gate
 scales a sigma: it is the estimator's equations that are judged.
