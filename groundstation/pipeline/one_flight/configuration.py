@@ -301,7 +301,10 @@ def load_configuration(
 
 
 def _left_out(listed: Any, given: Iterable[str] | None, name: str) -> tuple[str, ...]:
-    """Return the names of the analyses that are left out, of a settings file and of the command line."""
+    """Return the names of the analyses that are left out.
+
+    They are those of a settings file and of the command line.
+    """
     if not isinstance(listed, list) or not all(isinstance(one, str) for one in listed):
         raise SettingsError(f"{name}, without", repr(listed), "a list of names of analyses")
     found = tuple(dict.fromkeys([*listed, *(given or ())]))
