@@ -175,7 +175,6 @@ def test_a_third_of_the_fixes_left_out_changes_little() -> None:
     kept = np.random.default_rng(2).random(len(log[1])) > 1.0 / 3.0
     kept[0] = True
     off = differences(track_of(solved(taken(log, kept))), track_of(plain()))
-    print("THIRD", np.sqrt(np.mean(off**2, axis=0)), np.abs(off).max())
     assert np.sqrt(np.mean(off**2, axis=0)).max() < 1.0 and np.abs(off).max() < 3.0
 
 
@@ -185,7 +184,6 @@ def test_the_line_and_the_own_estimate_agree() -> None:
     own = run_pass(problem.samples, problem.plan(model), problem.noise(model), rules, found.result.start, OWN_ESTIMATE)
     off = differences(smoothed_track(problem.samples, found.result), smoothed_track(problem.samples, own))
     later = own.plan.epoch_s[0] + LINE_FROM_S < track_of(found).time_s
-    print("LINE", np.abs(off[later]).max(axis=0), np.sqrt(np.mean(off[later] ** 2, axis=0)))
     assert np.abs(off[later]).max() < 0.5
     assert len(line_of(own).nav) == len(own.plan.epoch_s)
 

@@ -77,8 +77,8 @@ def known_model(settings: ImuSettings) -> Model:
 def known_sigmas(settings: ImuSettings) -> StartSigmas:
     """Return the sigmas of the constants of a simulated log.
 
-    Half of what turns the accelerometers against each other is a rotation of all three: the attitude is theirs, and the
-    gyros are misaligned to them by so much more.
+    Half of what turns the accelerometers against each other is a rotation of all three. The attitude is theirs, and the
+    gyros are misaligned to them by so much more, two and two of them together: the variance is that of their rotation.
     """
     unit, factor = load_imu_class(settings.imu_class), settings.error_factor
     gyro = float(np.hypot(unit.gyro_constant_dph, unit.gyro_random_dph)) / HOUR
@@ -99,7 +99,7 @@ def known_sigmas(settings: ImuSettings) -> StartSigmas:
         gyro_bias_dps=factor * gyro,
         accel_bias_mg=factor * accel,
         gyro_scale=factor * float(ppm[0]),
-        misalignment_deg=factor * float(np.degrees(np.hypot(ppm[1], ppm[3] * np.sqrt(0.5)))),
+        misalignment_deg=factor * float(np.degrees(np.hypot(ppm[1], ppm[3]))),
         accel_scale=factor * float(ppm[2]),
         accel_square_deg=factor * float(np.degrees(ppm[3] * np.sqrt(0.5))),
     )
