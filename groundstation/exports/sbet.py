@@ -1,18 +1,27 @@
-"""SBET records of the track of an INS: 17 doubles, heading from true north.
+"""SBET records of a track with attitude: 17 doubles, heading from true north; SMRMSG beside it.
 
-The format is that of Applanix, POSPac MMS file formats.
+The formats are those of Applanix, POSPac MMS file formats.
 """
 
 from pathlib import Path
 
 import numpy as np
 
-from groundstation.base.angles import wrap_180
+from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.base.errors import NotAssessableError
+from groundstation.base.records import Int64Array
 from groundstation.base.timescales import GPS_EPOCH_NS, leap_seconds_at
-from groundstation.base.units import NS_PER_S
-from groundstation.exports.tracks import ELLIPSOID, Track
-from groundstation.readers.sbet_records import RECORD, S_PER_WEEK
+from groundstation.base.units import ARCMIN_PER_DEG, NS_PER_S
+from groundstation.exports.tracks import (
+    ANGLE_SIGMAS,
+    EAST_SIGMA,
+    ELLIPSOID,
+    NORTH_SIGMA,
+    VELOCITY_SIGMAS,
+    VERTICAL_SIGMA,
+    Track,
+)
+from groundstation.readers.sbet_records import ACCURACY, RECORD, S_PER_WEEK
 
 NS_PER_DAY = 86_400 * NS_PER_S
 NEEDED = (
@@ -24,6 +33,8 @@ NEEDED = (
     "pitch_deg",
     "true_heading_deg",
 )
+
+SIGMAS = (NORTH_SIGMA, EAST_SIGMA, VERTICAL_SIGMA, *VELOCITY_SIGMAS, *ANGLE_SIGMAS)  # in the order of SMRMSG
 
 
 def write_sbet(path: Path, track: Track) -> int:
@@ -46,11 +57,7 @@ def write_sbet(path: Path, track: Track) -> int:
             track.name, "no position with altitude above the ellipsoid, velocity and attitude", "an INS with them"
         )
     records = np.zeros(int(np.count_nonzero(known)), RECORD)
-    days, day = np.unique(track.time_ns[known] // NS_PER_DAY, return_inverse=True)
-    leap_s = np.array([leap_seconds_at(int(one) * NS_PER_DAY) for one in days])[day]  # they come at midnight
-    gps_ns = track.time_ns[known] - GPS_EPOCH_NS + leap_s * NS_PER_S
-    week_ns = gps_ns[0] // (S_PER_WEEK * NS_PER_S) * S_PER_WEEK * NS_PER_S
-    records["time"] = (gps_ns - week_ns) / NS_PER_S
+    records["time"] = _week_s(track.time_ns[known])
     records["latitude"] = np.deg2rad(track.latitude_deg[known])
     records["longitude"] = np.deg2rad(track.longitude_deg[known])
     records["altitude"], north, east, down, roll, pitch, heading = (track.column(name)[known] for name in NEEDED)
@@ -59,3 +66,31 @@ def write_sbet(path: Path, track: Track) -> int:
     records["platform_heading"] = np.deg2rad(wrap_180(heading))
     path.write_bytes(records.tobytes())
     return int(len(track) - len(records))
+
+
+def write_accuracies(path: Path, track: Track) -> int:
+    """Write the sigmas of the positions whose sigmas are all known, as SMRMSG; return how many.
+
+    They are those of position in metres, of velocity in m/s, both north, east, down, and of roll, pitch and heading in
+    minutes of arc. Times are those of the SBET. No file is written where there are none.
+    """
+    placed = np.isfinite([track.column(name) for name in NEEDED]).all(axis=0)
+    known = placed & np.isfinite([track.column(name) for name in SIGMAS]).all(axis=0)
+    if not track.has_utc or not known.any():
+        return 0
+    records = np.zeros(int(np.count_nonzero(known)), ACCURACY)
+    records["time"] = _week_s(track.time_ns[placed])[known[placed]]
+    for field, name in zip((ACCURACY.names or ())[1:], SIGMAS, strict=True):
+        factor = ARCMIN_PER_DEG if name in ANGLE_SIGMAS else 1.0
+        records[field] = factor * track.column(name)[known]
+    path.write_bytes(records.tobytes())
+    return len(records)
+
+
+def _week_s(time_ns: Int64Array) -> FloatArray:
+    """Return seconds of the GPS week of the first of some moments, which go on beyond its end."""
+    days, day = np.unique(time_ns // NS_PER_DAY, return_inverse=True)
+    leap_s = np.array([leap_seconds_at(int(one) * NS_PER_DAY) for one in days])[day]  # they come at midnight
+    gps_ns = time_ns - GPS_EPOCH_NS + leap_s * NS_PER_S
+    week_ns = gps_ns[0] // (S_PER_WEEK * NS_PER_S) * S_PER_WEEK * NS_PER_S
+    return np.asarray((gps_ns - week_ns) / NS_PER_S)

@@ -1,4 +1,4 @@
-"""Tracks to export: those logged, and those that an analysis made of an INS."""
+"""Tracks to export: those logged, those made of an INS, and the best trajectory."""
 
 import math
 from collections.abc import Mapping
@@ -12,8 +12,10 @@ from groundstation.base.ellipse import ELLIPSE_95, principal_axes
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
+from groundstation.results.arrays.states import BodyStates
 from groundstation.results.corrected_position import BestTrack, MadeTrack
 from groundstation.results.flight import FlightResults
+from groundstation.results.roles import StatesAlongTheFlight
 from groundstation.tables.motion import horizontal_speed_mps
 from groundstation.tables.table import Flight, Table
 
@@ -26,7 +28,9 @@ OF_THE_FIX = ("hdop", "satellites_used")
 BRIDGED_S = 0.25  # altitude, attitude and velocity of other rows are interpolated over at most so long
 EPOCH_BRIDGED_S = 1.5  # altitude of the INS at the epochs of a track made of it, which are as far apart
 SPEED, HALF_WIDTH = "ground_speed_mps", "horizontal95_m"
-NORTH_SIGMA, EAST_SIGMA = "north_sigma_m", "east_sigma_m"
+NORTH_SIGMA, EAST_SIGMA, VERTICAL_SIGMA = "north_sigma_m", "east_sigma_m", "vertical_sigma_m"
+VELOCITY_SIGMAS = tuple(f"velocity_{axis}_sigma_mps" for axis in ("north", "east", "down"))
+ANGLE_SIGMAS = ("roll_sigma_deg", "pitch_sigma_deg", "true_heading_sigma_deg")
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,9 @@ class Track:
     latitude_deg, longitude_deg : ndarrays, shape (n,)
     columns : mapping of str to ndarray, shape (n,)
         Further data of each position, altitudes among it, NaN where it is not.
+    is_best : bool
+        True of the best trajectory where its checks hold: a format of one track takes it before the logged ones if it
+        can hold attitude.
     """
 
     name: str
@@ -56,6 +63,7 @@ class Track:
     latitude_deg: FloatArray
     longitude_deg: FloatArray
     columns: Mapping[str, FloatArray]
+    is_best: bool = False
 
     def __len__(self) -> int:
         return len(self.time_ns)
@@ -76,7 +84,7 @@ class Track:
 
 
 def tracks_of(flight: Flight, results: FlightResults | None) -> tuple[Track, ...]:
-    """Return the tracks of a flight: every receiver's and INS's, then those made of an INS.
+    """Return the tracks of a flight: every receiver's and INS's, those made of an INS, the best.
 
     They are the tracks that have positions. The altitude of the INS stands beside the positions made of it.
     """
@@ -86,6 +94,10 @@ def tracks_of(flight: Flight, results: FlightResults | None) -> tuple[Track, ...
     best = None if results is None else results.answer_meeting(BestTrack)
     if results is not None and best is not None:
         tracks += [_made(flight, made, best.ins_topic) for made in best.tracks(results)]
+    estimated = None if results is None else results.answer_meeting(StatesAlongTheFlight)
+    states = None if results is None else results.rows_of(BodyStates)
+    if estimated is not None and states is not None:
+        tracks.append(_estimated(flight, estimated, states))
     return tuple(track for track in tracks if len(track))
 
 
@@ -145,6 +157,40 @@ def _made(flight: Flight, made: MadeTrack, ins_topic: str) -> Track:
     time_ns = flight.start_ns + np.rint(made.time_s * NS_PER_S).astype(np.int64)
     title, place = f"{made.title}, height of the INS", (made.latitude_deg, made.longitude_deg)
     return Track(made.name, title, time_ns, flight.start_ns, flight.has_utc, *place, columns)
+
+
+def _estimated(flight: Flight, estimated: StatesAlongTheFlight, states: BodyStates) -> Track:
+    """Return the track of the states of a vehicle, every one."""
+    given = dict(states.columns)
+    sigmas = {NORTH_SIGMA: given["position_north_sigma_m"], EAST_SIGMA: given["position_east_sigma_m"]}
+    others = (*ALTITUDES, *MOVES, *DIRECTIONS, VERTICAL_SIGMA, *VELOCITY_SIGMAS, *ANGLE_SIGMAS)
+    columns = {name: given[name] for name in others if name in given} | sigmas
+    columns |= _other_altitude(flight, estimated.gnss_topic, states)
+    major = principal_axes(*sigmas.values(), np.zeros(len(states)))[0]
+    columns[HALF_WIDTH] = ELLIPSE_95 * major
+    columns[SPEED] = np.hypot(states.velocity_north_mps, states.velocity_east_mps)
+    time_ns = flight.start_ns + np.rint(states.time_s * NS_PER_S).astype(np.int64)
+    clock = (time_ns, flight.start_ns, flight.has_utc)
+    place = (states.latitude_deg, states.longitude_deg)
+    title = estimated.states_title
+    return Track(estimated.states_name, title, *clock, *place, columns, is_best=estimated.is_reference)
+
+
+def _other_altitude(flight: Flight, gnss_topic: str, states: BodyStates) -> dict[str, FloatArray]:
+    """Return the altitude that the states lack, by the geoid's height of the receiver's rows that have both."""
+    if gnss_topic not in flight or not (flight[gnss_topic].has(MSL) and flight[gnss_topic].has(ELLIPSOID)):
+        return {}
+    table = flight[gnss_topic].unique_times()
+    geoid_m = table.values(ELLIPSOID) - table.values(MSL)
+    known = np.isfinite(geoid_m)
+    if not known.any():
+        return {}
+    geoid_m = np.interp(states.time_s, flight.seconds(table.time_ns)[known], geoid_m[known])
+    if states.altitude_ellipsoid_m is not None and states.altitude_msl_m is None:
+        return {MSL: states.altitude_ellipsoid_m - geoid_m}
+    if states.altitude_msl_m is not None and states.altitude_ellipsoid_m is None:
+        return {ELLIPSOID: states.altitude_msl_m + geoid_m}
+    return {}
 
 
 def _altitudes(flight: Flight, ins_topic: str, at_s: FloatArray) -> dict[str, FloatArray]:

@@ -9,6 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from groundstation.base.clock import Clock
 from groundstation.base.errors import (
     GroundstationError,
@@ -18,7 +20,10 @@ from groundstation.base.errors import (
     told_in_a_line,
 )
 from groundstation.base.ledger import Ledger
+from groundstation.base.records import Column
+from groundstation.base.units import NS_PER_S
 from groundstation.results.answer import A
+from groundstation.results.arrays.states import BodyStates
 from groundstation.results.flight import FlightResults, Source
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.inertial.answer import InertialResult
@@ -26,7 +31,8 @@ from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.systems.latency.answer import Latencies
 from groundstation.systems.magnetic.answer import MagneticResult
 from groundstation.systems.magnetic.ground_answer import GroundDeviation
-from groundstation.tables.table import Flight, Tables
+from groundstation.systems.trajectory.answer import BestTrajectory
+from groundstation.tables.table import Flight, Table, Tables, TimedTable, timed
 
 if TYPE_CHECKING:
     from groundstation.plots.plot import Plot
@@ -139,6 +145,35 @@ class OpenFlight(ABC):
         Raises as :meth:`heading`.
         """
         return self.answer(GroundDeviation)
+
+    def trajectory(self) -> BestTrajectory:
+        """Return the best trajectory: its state, accuracy, checks, and the errors of the on-board filter.
+
+        :meth:`states` has the trajectory itself. Raises as :meth:`heading`.
+        """
+        return self.answer(BestTrajectory)
+
+    def states(self) -> TimedTable:
+        """Return every state of the best trajectory with its sigmas, as a table.
+
+        ``states()["true_heading_deg"]`` is an array, ``states().to_frame()`` a frame indexed by UTC, or by flight time
+        where there is none. Names are those of :attr:`tables`.
+
+        Raises
+        ------
+        NotAssessableError
+            As :meth:`trajectory`; or when the flight folder was made by a version that did not keep them.
+        """
+        of = self.trajectory()
+        kept = self.results.rows_of(BodyStates)
+        if kept is None:
+            raise NotAssessableError(of.states_name, "its states are not kept", "", "run the log again")
+        start_utc_ns = self.results.start_utc_ns
+        start_ns = self.flight.start_ns if start_utc_ns is None else start_utc_ns
+        time_ns = start_ns + np.rint(kept.time_s * NS_PER_S).astype(np.int64)
+        columns = {name: Column(values) for name, values in kept.columns.items() if name != "time_s"}
+        table = Table(of.states_name, time_ns, columns, np.arange(len(kept)), Column(time_ns))
+        return timed(Flight({table.topic: table}, {}, start_ns, start_utc_ns is not None), table.topic)
 
     def answer(self, kind: type[A]) -> A:
         """Return the answer of any analysis, by its type.

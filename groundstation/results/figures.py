@@ -27,6 +27,7 @@ class FigureData:
     """
 
     is_kept_apart: ClassVar[bool] = True  # from the answer that holds it: arrays have files of their own
+    is_copied: ClassVar[bool] = True  # to tables/, for people; False: too many rows to read
     name: str
     columns: Mapping[str, NDArray[Any]]
     digits: Mapping[str, int]

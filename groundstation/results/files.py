@@ -1,6 +1,6 @@
 """Files of one flight: summary.json, manifest.json, arrays/*.parquet, tables/*.csv.
 
-The tables are readable copies of the arrays.
+The tables are readable copies of the arrays, but for those of too many rows to read.
 """
 
 import io
@@ -177,9 +177,10 @@ def save(folder: Path, results: FlightResults, manifest: Manifest) -> None:
 
 
 def _save_figure(folder: Path, figure: FigureData) -> None:
-    text = csv_text(figure)
+    text = csv_text(figure) if figure.is_copied else ""
     _write_parquet(folder / ARRAYS / f"{figure.name}.parquet", figure)
-    write_text(folder / TABLES / f"{figure.name}.csv", text, is_synced=False)
+    if text:
+        write_text(folder / TABLES / f"{figure.name}.csv", text, is_synced=False)
 
 
 def put_failures(folder: Path, found: Sequence[Failure], made_again: Sequence[str] = ()) -> bool:

@@ -11,6 +11,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.results.arrays.states import BodyStates
 from groundstation.results.gates import Gate
 
 FloatArray = NDArray[np.float64]
@@ -246,6 +247,54 @@ class ErrorsAlongTheFlight:
 
     ins_topic: str
     outages: Sequence[Outage]
+
+
+class StatesAlongTheFlight:
+    """Role of an answer with position, velocity and attitude along the flight, and their sigmas.
+
+    ``states_name`` is that of its track and table.
+    """
+
+    states_name: ClassVar[str]
+
+    @property
+    def gnss_topic(self) -> str:
+        """Topic of the receiver it rests on."""
+        raise NotImplementedError
+
+    @property
+    def is_reference(self) -> bool:
+        """Tell whether its checks hold, so that others may be set against it."""
+        raise NotImplementedError
+
+    @property
+    def by_it(self) -> str:
+        """Words for what is found by it: "by the best trajectory (heading to 0.3 deg)"."""
+        raise NotImplementedError
+
+    @property
+    def states_title(self) -> str:
+        """Title of its track, with what is doubtful of it."""
+        raise NotImplementedError
+
+    @property
+    def gnss_latency(self) -> tuple[float, float] | None:
+        """Delay of the receiver behind the inertial unit and its sigma, s; None where it is not observable."""
+        raise NotImplementedError
+
+    @property
+    def antenna_arm_m(self) -> tuple[float, float, float]:
+        """Antenna from the point of the states: forward, right, down; 0 where it is not observable."""
+        raise NotImplementedError
+
+    def body_states(self) -> BodyStates | None:
+        """Return the states, None where they are not kept."""
+        raise NotImplementedError
+
+    def states_at_antenna(self) -> BodyStates | None:
+        """Return the states of the GNSS antenna, None where they are not kept."""
+        states = self.body_states()
+        return None if states is None else states.at_point(*self.antenna_arm_m)
 
 
 class WordsOfRecord:

@@ -16,6 +16,7 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import as_log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.readers.sbet import accuracies_beside
 from groundstation.tables.table import Flight
 
 if TYPE_CHECKING:
@@ -32,14 +33,16 @@ def export(
 ) -> Outcome:
     """Write tracks of a flight to ``target`` in the format of its suffix.
 
-    .kml, .gpx, .csv, .parquet, .nmea, .sbet or .out (SBET).
+    .kml, .gpx, .csv, .parquet, .nmea, .sbet or .out (SBET). The sigmas of a track are written beside an SBET whose name
+    begins with ``sbet``, as ``smrmsg``.
 
     Parameters
     ----------
     path : Path
-        A flight folder, an MCAP or a log. The tracks of the estimator are in a folder alone.
+        A flight folder, an MCAP or a log. The tracks of the estimators are in a folder alone.
     names : sequence of str
-        Tracks wanted: topics, ``corrected``, ``smoothed``; none: all, or the first that the format can hold.
+        Tracks wanted: topics, ``corrected``, ``smoothed`` ...; none: all, or the first that the format can hold, in an
+        SBET the best trajectory before the logged tracks.
 
     Raises
     ------
@@ -51,8 +54,13 @@ def export(
     suffix = target.suffix.lower()
     require_suffix(target, (*WRITERS, *WRITERS_OF_ONE))
     require_place(path, target, force)
+    beside = accuracies_beside(target) if WRITERS_OF_ONE.get(suffix) is _sbet else None
+    if beside is not None:
+        require_place(path, beside, force)
     flight, saved, has_lost = _read(path, configuration or Configuration())
     tracks = _wanted(tracks_of(flight, None if saved is None else saved.results), names, path.name)
+    if WRITERS_OF_ONE.get(suffix) is _sbet:
+        tracks = tuple(sorted(tracks, key=lambda track: not track.is_best))
     with told_in_a_line(str(target)):
         target.parent.mkdir(parents=True, exist_ok=True)
         if suffix in WRITERS:
@@ -187,9 +195,13 @@ def _nmea(path: Path, track: Track) -> int:
 
 
 def _sbet(path: Path, track: Track) -> int:
-    from groundstation.exports.sbet import write_sbet
+    from groundstation.exports.sbet import write_accuracies, write_sbet
 
-    return write_sbet(path, track)
+    left_out = write_sbet(path, track)
+    beside = accuracies_beside(path)
+    if beside is not None and not write_accuracies(beside, track):
+        beside.unlink(missing_ok=True)  # those of an SBET that was overwritten
+    return left_out
 
 
 WRITERS: Mapping[str, Callable[[Path, str, Sequence[Track]], None]] = {

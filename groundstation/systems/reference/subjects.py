@@ -12,7 +12,9 @@ from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
 from groundstation.base.signals import topics_of_kind
-from groundstation.results.roles import HeadingByTrack
+from groundstation.base.units import NS_PER_S
+from groundstation.results.arrays.states import BodyStates
+from groundstation.results.roles import HeadingByTrack, StatesAlongTheFlight
 from groundstation.systems.known import Known
 from groundstation.tables.epochs import distinct_epochs
 from groundstation.tables.headings import true_heading
@@ -31,12 +33,25 @@ def subjects_of(flight: Flight, known: Known) -> Iterator[tuple[str, Table]]:
     for working in known.workings.values():
         if isinstance(working, HasTracks):
             yield from working.tracks(flight.start_ns)
+    estimated = known.answer_meeting(StatesAlongTheFlight)
+    states = None if estimated is None else estimated.states_at_antenna()
+    if estimated is not None and states is not None:
+        yield estimated.states_name, _of_states(states, flight.start_ns)
     heading = known.answer_meeting(HeadingByTrack)
     if heading is not None and heading.ins_topic in flight:
         corrected = wrap_360(_true_heading(flight, heading.ins_topic) - heading.error_deg)
         sigma = np.full(len(corrected), heading.standard_error_deg)
         columns = {"true_heading_deg": corrected, "true_heading_sigma_deg": sigma}
         yield "heading", ins_table(flight[heading.ins_topic].time_ns, columns)
+
+
+def _of_states(states: BodyStates, start_ns: int) -> Table:
+    """Return states as a table, the sigmas of north and east together, as a claim has them."""
+    columns = {name: values for name, values in states.columns.items() if name not in ("time_s", "segment")}
+    position = (states.position_north_sigma_m, states.position_east_sigma_m)
+    velocity = (states.velocity_north_sigma_mps, states.velocity_east_sigma_mps)
+    columns |= {"horizontal_sigma_m": np.hypot(*position), "velocity_sigma_mps": np.hypot(*velocity)}
+    return ins_table(start_ns + np.rint(states.time_s * NS_PER_S).astype(np.int64), columns)
 
 
 def _ins(flight: Flight, topic: str) -> Table:

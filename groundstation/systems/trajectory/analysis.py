@@ -4,9 +4,10 @@ from typing import TYPE_CHECKING
 
 from groundstation.base.signals import topics_of_kind
 from groundstation.results.answer import Answers, answer_of
-from groundstation.systems.analysis import Analysis, Found
+from groundstation.systems.analysis import Analysis, Found, Shortfall
 from groundstation.systems.known import Known
 from groundstation.systems.trajectory.answer import BestTrajectory
+from groundstation.systems.trajectory.columns import COLUMNS
 from groundstation.systems.trajectory.settings import TrajectorySettings
 
 if TYPE_CHECKING:
@@ -14,10 +15,18 @@ if TYPE_CHECKING:
 
 
 def _run(flight: "Flight", known: Known, settings: TrajectorySettings) -> Found[BestTrajectory]:
+    from groundstation.systems.trajectory.examine import advised
     from groundstation.systems.trajectory.solve import solve
 
-    answer, findings, workings = solve(flight, known, settings)
+    with advised(flight):
+        answer, findings, workings = solve(flight, known, settings)
     return Found(answer, findings, workings)
+
+
+def _examine(flight: "Flight", known: Known, settings: TrajectorySettings) -> tuple[Shortfall, ...]:
+    from groundstation.systems.trajectory.examine import examine_trajectory
+
+    return examine_trajectory(flight, known, settings)
 
 
 def _has_unit(flight: "Flight", _known: Known) -> bool:
@@ -42,4 +51,6 @@ TRAJECTORY = Analysis(
     run=_run,
     applies=_has_unit,
     sentence=_sentence,
+    columns=COLUMNS,
+    examine=_examine,
 )

@@ -6,14 +6,20 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Literal
 
 from groundstation.results.answer import Answer
+from groundstation.results.arrays.states import BodyStates
+from groundstation.results.arrays.typed import found_in
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
+from groundstation.results.roles import StatesAlongTheFlight
 
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
 
 TrajectoryState = Literal["accepted", "doubtful", "ambiguous"]
 MountingSource = Literal["stated", "logged", "found", "case"]
 OutageTruth = Literal["undisturbed solution", "RTK"]
+# Names of parameters that others read: of the lever arm, and of the receiver's delay.
+ARM = ("antenna forward of the unit", "antenna right of the unit", "antenna down of the unit")
+LATENCY, VELOCITY_LAG = "GNSS latency", "GNSS velocity behind its position"
 OffsetCause = Literal["", "mounting", "antenna", "datum"]
 Quantity = Literal[
     "heading",
@@ -328,7 +334,7 @@ class SeparationRow:
 
 
 @dataclass(frozen=True)
-class BestTrajectory(Answer):
+class BestTrajectory(Answer, StatesAlongTheFlight):
     """Best trajectory of a flight, smoothed over raw inertial data and GNSS.
 
     Parameters
@@ -367,6 +373,7 @@ class BestTrajectory(Answer):
     """
 
     analysis: ClassVar[str] = "trajectory"
+    states_name: ClassVar[str] = analysis
 
     state: TrajectoryState
     reasons: tuple[str, ...]
@@ -412,3 +419,58 @@ class BestTrajectory(Answer):
     def accuracy_of(self, quantity: Quantity) -> TrajectoryAccuracy | None:
         """Return the accuracy of a quantity, None where it has none."""
         return next((one for one in self.accuracy if one.quantity == quantity), None)
+
+    def parameter(self, name: str) -> TrajectoryParameter | None:
+        """Return the parameter of a name, None where the model has none."""
+        return next((one for one in self.parameters if one.name == name), None)
+
+    @property
+    def gnss_topic(self) -> str:
+        """Topic of the receiver it rests on."""
+        return self.gnss
+
+    @property
+    def is_reference(self) -> bool:
+        """Tell whether its checks hold, so that others may be set against it."""
+        return self.state == "accepted"
+
+    @property
+    def by_it(self) -> str:
+        """Words for what is found by it.
+
+        Examples
+        --------
+        >>> heading = TrajectoryAccuracy("heading", "deg", 0.15, 0.4, 0.294)
+        >>> mounting, segments = UnitMounting("case", ""), (TrajectorySegment(0.0, 60.0),)
+        >>> BestTrajectory(
+        ...     "accepted", (), "imu", "gnss", True, 100.0, "rolls", segments, 50.0, mounting, (heading,)
+        ... ).by_it
+        'by the best trajectory (heading to 0.29 deg)'
+        """
+        heading = self.accuracy_of("heading")
+        told = "" if heading is None else f" (heading to {heading.median_within95:.2g} deg)"
+        return f"by the best trajectory{told}"
+
+    @property
+    def states_title(self) -> str:
+        """Title of its track, with what is doubtful of it."""
+        told = "" if self.is_reference else f", {self.state}: {'; '.join(self.reasons)}"
+        return f"best trajectory, smoothed{told}"
+
+    @property
+    def gnss_latency(self) -> tuple[float, float] | None:
+        """Delay of the receiver behind the inertial unit and its sigma, s; None where it is not observable."""
+        found = self.parameter(LATENCY)
+        return None if found is None or not found.is_observable else (found.value, found.sigma)
+
+    @property
+    def antenna_arm_m(self) -> tuple[float, float, float]:
+        """Antenna from the inertial unit: forward, right, down; 0 where it is not observable."""
+        forward, right, down = (
+            one.value if (one := self.parameter(name)) is not None and one.is_observable else 0.0 for name in ARM
+        )
+        return forward, right, down
+
+    def body_states(self) -> BodyStates | None:
+        """Return the states, None where they are not kept."""
+        return found_in(self.figures, BodyStates)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from groundstation.base.angles import wrap_180
 from groundstation.base.geodesy import curvature_radii_m
 from groundstation.base.quantiles import NORMAL_95, length_quantile
+from groundstation.results.arrays.states import BodyStates
 from groundstation.systems.trajectory.answer import (
     UNITS,
     Quantity,
@@ -86,6 +87,34 @@ def track_figure(track: TrackOfStates, other_heading_deg: FloatArray | None = No
         pitch_sigma_deg=turning_sigma[1],
         heading_sigma_deg=turning_sigma[2],
         other_heading_deg=None if other_heading_deg is None else other_heading_deg[rows],
+    )
+
+
+def states_of(track: TrackOfStates, height: str) -> BodyStates:
+    """Return every state of a track; ``height`` is the datum of its heights: ellipsoid, msl, or empty."""
+    position, velocity, attitude = track.position_sigma_m, track.velocity_sigma_mps, track.attitude_sigma_deg
+    return BodyStates(
+        time_s=track.time_s,
+        segment=track.segment,
+        latitude_deg=track.latitude_deg,
+        longitude_deg=track.longitude_deg,
+        altitude_ellipsoid_m=track.height_m if height == "ellipsoid" else None,
+        altitude_msl_m=track.height_m if height == "msl" else None,
+        velocity_north_mps=track.velocity_mps[:, 0],
+        velocity_east_mps=track.velocity_mps[:, 1],
+        velocity_down_mps=track.velocity_mps[:, 2],
+        roll_deg=track.roll_deg,
+        pitch_deg=track.pitch_deg,
+        true_heading_deg=track.heading_deg,
+        position_north_sigma_m=position[:, 0],
+        position_east_sigma_m=position[:, 1],
+        vertical_sigma_m=position[:, 2],
+        velocity_north_sigma_mps=velocity[:, 0],
+        velocity_east_sigma_mps=velocity[:, 1],
+        velocity_down_sigma_mps=velocity[:, 2],
+        roll_sigma_deg=attitude[:, 0],
+        pitch_sigma_deg=attitude[:, 1],
+        true_heading_sigma_deg=attitude[:, 2],
     )
 
 

@@ -59,8 +59,8 @@ def solve(
     """
     gathered = gather(flight, known, settings.input)
     vehicle = known.phases.vehicle.kind
-    mounting = _mounting(flight, known, gathered, settings)
-    _enough(gathered, settings)
+    mounting = mounting_of(flight, known, gathered, settings)
+    require_enough(gathered, settings)
     imu = turned(gathered.imu, mounting.body_from_case)
     lag_s = mounting.evidence.lag_s
     segments = estimate_segments(
@@ -75,7 +75,14 @@ def solve(
     return _answered(flight, gathered, mounting, segments, settings, vehicle or "")
 
 
-def _mounting(flight: "Flight", known: Known, gathered: Gathered, settings: TrajectorySettings) -> Mounting:
+def mounting_of(flight: "Flight", known: Known, gathered: Gathered, settings: TrajectorySettings) -> Mounting:
+    """Return the mounting of the unit.
+
+    Raises
+    ------
+    NotAssessableError
+        Where no turn of its axes fits the motion.
+    """
     mounting = find_mounting(
         gathered.imu,
         gathered.gnss,
@@ -98,8 +105,13 @@ def turned(imu: ImuIncrements, body_from_case: FloatArray) -> ImuIncrements:
     )
 
 
-def _enough(gathered: Gathered, settings: TrajectorySettings) -> None:
-    """Refuse a log with too little motion, or samples too slow for it."""
+def require_enough(gathered: Gathered, settings: TrajectorySettings) -> None:
+    """Refuse a log with too little motion, or samples too slow for it.
+
+    Raises
+    ------
+    NotAssessableError
+    """
     start_s, end_s = float(gathered.imu.time_s[0]), float(gathered.imu.time_s[-1])
     motion_s = moving_s(gathered.gnss, start_s, end_s, settings.moving_mps)
     if motion_s < settings.moving_min_s:
@@ -177,6 +189,7 @@ def _answered(
         settings=asdict(settings),
         figures=(
             figures.track_figure(smoothed, other),
+            figures.states_of(smoothed, gathered.gnss_facts.height),
             separation_figure,
             *(() if compared is None else (compared.figure,)),
             tell.residuals_of(estimates),

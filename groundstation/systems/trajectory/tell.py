@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from groundstation.systems.trajectory.answer import NoiseRow, TrajectoryParameter
+from groundstation.systems.trajectory.answer import ARM, LATENCY, VELOCITY_LAG, NoiseRow, TrajectoryParameter
 from groundstation.systems.trajectory.arrays import TrajectoryBiases, TrajectoryOutages, TrajectoryResiduals
 from groundstation.systems.trajectory.estimate import Estimate
 from groundstation.systems.trajectory.figures import rows_shown
@@ -69,7 +69,7 @@ def parameter_rows(estimate: Estimate) -> tuple[TrajectoryParameter, ...]:
     """Return the constants that the log shows, and the biases at its end."""
     value = estimate.result.constants
     sigma, start = np.sqrt(estimate.result.constants_variance), np.sqrt(estimate.problem.variances(estimate.model))
-    axes, body = "xyz", ("forward", "right", "down")
+    axes = "xyz"
     rows = []
 
     def put(at: int, name: str, group: str, unit: str, per: float, offset: float = 0.0) -> None:
@@ -89,10 +89,10 @@ def parameter_rows(estimate: Estimate) -> tuple[TrajectoryParameter, ...]:
         put(MG + i, f"gyro misalignment {axes[reads]}{axes[turns]}", "gyro misalignment", "deg", DEG)
     for i, (one, other) in enumerate(NOT_SQUARE):
         put(MA + i, f"accelerometer {axes[one]} to {axes[other]}, not square by", "accelerometer axes", "deg", DEG)
-    for i, axis in enumerate(body):
-        put(LEV + i, f"antenna {axis} of the unit", "lever arm", "m", 1.0)
-    put(LAT, "GNSS latency", "latency", "s", 1.0, estimate.problem.latency_s)
-    put(LAG, "GNSS velocity behind its position", "latency", "s", 1.0, estimate.problem.lag_s)
+    for i, name in enumerate(ARM):
+        put(LEV + i, name, "lever arm", "m", 1.0)
+    put(LAT, LATENCY, "latency", "s", 1.0, estimate.problem.latency_s)
+    put(LAG, VELOCITY_LAG, "latency", "s", 1.0, estimate.problem.lag_s)
     put(MNT, "travel in the unit, yaw", "mounting", "deg", DEG)
     put(MNT + 1, "travel in the unit, pitch", "mounting", "deg", DEG)
     return tuple(rows)

@@ -27,7 +27,7 @@ from groundstation.systems.trajectory.arrays import (
     TrajectoryResiduals,
     TrajectoryTrack,
 )
-from groundstation.systems.trajectory.figures import accuracy_of, segments_of, separation_of, track_figure
+from groundstation.systems.trajectory.figures import accuracy_of, segments_of, separation_of, states_of, track_figure
 from groundstation.systems.trajectory.onboard import compare_onboard
 from groundstation.systems.trajectory.solution import TrackOfStates
 from tests.report_example import example
@@ -94,6 +94,7 @@ def accepted(of: TrackOfStates | None = None, *, heading_error_deg: float = 2.1,
         settings={},
         figures=(
             track_figure(states),
+            states_of(states, "ellipsoid"),
             separation,
             *(() if compared is None else (compared.figure,)),
             _residuals(states),
@@ -197,9 +198,9 @@ def _parameters() -> tuple[TrajectoryParameter, ...]:
         for axis, value in zip("xyz", (3.4, -12.0, 7.7), strict=True)
     ]
     rows += [
-        TrajectoryParameter("lever arm forward", "lever arm", "m", 0.61, 0.12, 2.0, True),
-        TrajectoryParameter("lever arm right", "lever arm", "m", -0.05, 0.14, 2.0, True),
-        TrajectoryParameter("lever arm down", "lever arm", "m", 0.2, 1.9, 2.0, False),
+        TrajectoryParameter("antenna forward of the unit", "lever arm", "m", 0.61, 0.12, 2.0, True),
+        TrajectoryParameter("antenna right of the unit", "lever arm", "m", -0.05, 0.14, 2.0, True),
+        TrajectoryParameter("antenna down of the unit", "lever arm", "m", 0.2, 1.9, 2.0, False),
         TrajectoryParameter("GNSS latency", "latency", "s", 0.112, 0.004, 0.3, True),
         TrajectoryParameter("wheel scale", "wheel", "%", 1.4, 0.1, 5.0, True),
     ]
