@@ -511,6 +511,11 @@ def main() -> None:
     for family, name, rate_hz, fixes_hz in CASES:
         print(f"{family}, {name} unit at {rate_hz:g} Hz, fixes at {fixes_hz:g} Hz", flush=True)
         speed = speeds(family, name, rate_hz, fixes_hz)
+        if "ours" in speed:
+            beside = [f"{speed['ours'] / speed[who]:.3g} times {who}" for who in ("pyins", "INSLIB") if who in speed]
+            if "smoothed" in speed:
+                beside.append(f"with smoother {speed['ours'] / speed['smoothed']:.2f} times as long")
+            print(f"  our filter: {', '.join(beside)}", flush=True)
         logs = [given(family, name, rate_hz, fixes_hz, seed, DURATION_S) for seed in range(1, given_options.seeds + 1)]
         for who, make in SIDES.items():
             mine = logs[:1] if who == "pyins" else logs

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.chapters.agreement import agreement_note
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.parts import Note, Section
@@ -17,7 +18,7 @@ from groundstation.systems.heading.agreement_answer import heading_agreement
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.chapter import heading as heading_chapter
 from groundstation.systems.inertial.answer import InertialResult
-from groundstation.systems.latency.agreement_answer import latency_agreement
+from groundstation.systems.latency.agreement_answer import latency_agreement, trajectory_agreement
 from groundstation.systems.latency.answer import Latencies, Latency
 from groundstation.systems.latency.chapter import latency as latency_chapter
 from groundstation.systems.magnetic.agreement_answer import deviation_agreement
@@ -25,6 +26,7 @@ from groundstation.systems.magnetic.answer import DeclinationUsed, MagneticResul
 from groundstation.systems.magnetic.chapter import magnetic as magnetic_chapter
 from groundstation.systems.magnetic.estimate import estimate_deviation
 from groundstation.systems.magnetic.ground_answer import GroundDeviation, GroundRun
+from tests.states_example import MadeStates
 from tests.systems.inertial.example import inertial_result
 from tests.systems.magnetic.example import make, taxi_heading
 
@@ -177,3 +179,22 @@ def test_sigmas_are_those_of_both() -> None:
     found = Agreement("x", "deg", OneFinding("a", 0.0, 0.3), OneFinding("b", 1.0, 0.4))
     assert found.sigmas == pytest.approx(2.0)
     assert replace(found, between_sigma=1.2).sigmas == pytest.approx(1.0 / 1.3)
+
+
+# Latency by motion, and by the best trajectory against the raw inertial data
+
+
+def test_latency_is_set_against_that_of_the_trajectory() -> None:
+    """0.11 +- 0.01 by motion, 0.13 +- 0.006 by the trajectory: 0.02 over hypot(0.01, 0.006)."""
+    answers = (motion(0.11, NORMAL_95 * 0.01), MadeStates(latency=(0.13, 0.006)))
+    found = trajectory_agreement(by_analysis(*answers))
+    assert found is not None
+    assert found.sigmas == pytest.approx(0.02 / math.hypot(0.01, 0.006))
+    (note,) = notes_of(latency_chapter(results(*answers)))
+    assert note.tone == "good" and "by the best trajectory" in note.text and "agree" in note.text
+
+
+@pytest.mark.parametrize("made", [MadeStates(latency=(0.3, 0.01), accepted=False), MadeStates()])
+def test_a_trajectory_that_does_not_show_it_says_nothing(made: MadeStates) -> None:
+    assert trajectory_agreement(by_analysis(motion(0.11, 0.02), made)) is None
+    assert notes_of(latency_chapter(results(motion(0.11, 0.02), made))) == []

@@ -131,8 +131,8 @@ class Rank(IntEnum):
     ONBOARD_ERROR = 6  # of the filter on board, beyond the 95 % of a better solution
     HEALTH = 7  # of an autopilot and its filter
     GROUND_RUNS = 8
-    GNSS = 9  # reception
-    TRACK = 10  # the best one, and how sure it is
+    TRACK = 9  # the best one, and how sure it is
+    GNSS = 10  # reception
     HEADING_OPEN = 11  # undecided, too little taxi, or partly from taxi after the flight
     MAGNETIC_OPEN = 12
     INERTIAL_OPEN = 13  # aided by GNSS, or not known whether

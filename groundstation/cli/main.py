@@ -92,6 +92,10 @@ def run(
     profile: Profile = None,
     icd: IcdFiles = None,
     reference: ReferenceFiles = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option("--without", help="Analysis to leave out (groundstation list); may be repeated.", metavar="NAME"),
+    ] = None,
     jobs: Jobs = 0,
     scheduler: Annotated[
         str, typer.Option("--scheduler", help="Dask scheduler whose workers do the work.", metavar="tcp://HOST:PORT")
@@ -145,7 +149,7 @@ def run(
     from groundstation.pipeline.one_flight.configuration import applying, installed_as, load_configuration
 
     refuse_pdf_of_results(only, pdf=pdf)
-    settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd, weather)
+    settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd, weather, without)
     is_one_log = together or (len(paths) == 1 and not Path(paths[0]).is_dir())
     settings = installed_as(applying(settings, apply), installation)
     configuration = judged_by(settings, reference or (), is_one_log=is_one_log)

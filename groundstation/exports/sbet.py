@@ -1,4 +1,6 @@
-"""SBET records of a track with attitude: 17 doubles, heading from true north; SMRMSG beside it.
+"""SBET records of a track with attitude, and its sigmas as SMRMSG beside it.
+
+A record has 17 doubles; heading is from true north.
 
 The formats are those of Applanix, POSPac MMS file formats.
 """
@@ -69,20 +71,21 @@ def write_sbet(path: Path, track: Track) -> int:
 
 
 def write_accuracies(path: Path, track: Track) -> int:
-    """Write the sigmas of the positions whose sigmas are all known, as SMRMSG; return how many.
+    """Write the sigmas of the positions as SMRMSG, and return how many.
 
     They are those of position in metres, of velocity in m/s, both north, east, down, and of roll, pitch and heading in
-    minutes of arc. Times are those of the SBET. No file is written where there are none.
+    minutes of arc, of the positions of which all are known. Times are those of the SBET. No file is written where there
+    are none.
     """
-    placed = np.isfinite([track.column(name) for name in NEEDED]).all(axis=0)
-    known = placed & np.isfinite([track.column(name) for name in SIGMAS]).all(axis=0)
+    placed = np.flatnonzero(np.isfinite([track.column(name) for name in NEEDED]).all(axis=0))
+    sigmas = np.array([track.column(name)[placed] for name in SIGMAS])
+    known = np.isfinite(sigmas).all(axis=0)
     if not track.has_utc or not known.any():
         return 0
     records = np.zeros(int(np.count_nonzero(known)), ACCURACY)
-    records["time"] = _week_s(track.time_ns[placed])[known[placed]]
-    for field, name in zip((ACCURACY.names or ())[1:], SIGMAS, strict=True):
-        factor = ARCMIN_PER_DEG if name in ANGLE_SIGMAS else 1.0
-        records[field] = factor * track.column(name)[known]
+    records["time"] = _week_s(track.time_ns[placed])[known]
+    for field, name, sigma in zip((ACCURACY.names or ())[1:], SIGMAS, sigmas, strict=True):
+        records[field] = (ARCMIN_PER_DEG if name in ANGLE_SIGMAS else 1.0) * sigma[known]
     path.write_bytes(records.tobytes())
     return len(records)
 

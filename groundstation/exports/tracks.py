@@ -84,7 +84,7 @@ class Track:
 
 
 def tracks_of(flight: Flight, results: FlightResults | None) -> tuple[Track, ...]:
-    """Return the tracks of a flight: every receiver's and INS's, those made of an INS, the best.
+    """Return the tracks of a flight: logged ones, those made of an INS, the best.
 
     They are the tracks that have positions. The altitude of the INS stands beside the positions made of it.
     """
@@ -166,7 +166,7 @@ def _estimated(flight: Flight, estimated: StatesAlongTheFlight, states: BodyStat
     others = (*ALTITUDES, *MOVES, *DIRECTIONS, VERTICAL_SIGMA, *VELOCITY_SIGMAS, *ANGLE_SIGMAS)
     columns = {name: given[name] for name in others if name in given} | sigmas
     columns |= _other_altitude(flight, estimated.gnss_topic, states)
-    major = principal_axes(*sigmas.values(), np.zeros(len(states)))[0]
+    major = principal_axes(sigmas[NORTH_SIGMA], sigmas[EAST_SIGMA], np.zeros(len(states)))[0]
     columns[HALF_WIDTH] = ELLIPSE_95 * major
     columns[SPEED] = np.hypot(states.velocity_north_mps, states.velocity_east_mps)
     time_ns = flight.start_ns + np.rint(states.time_s * NS_PER_S).astype(np.int64)
@@ -177,7 +177,10 @@ def _estimated(flight: Flight, estimated: StatesAlongTheFlight, states: BodyStat
 
 
 def _other_altitude(flight: Flight, gnss_topic: str, states: BodyStates) -> dict[str, FloatArray]:
-    """Return the altitude that the states lack, by the geoid's height of the receiver's rows that have both."""
+    """Return the altitude that the states lack, by the height of the geoid.
+
+    That is known where the receiver gives both altitudes.
+    """
     if gnss_topic not in flight or not (flight[gnss_topic].has(MSL) and flight[gnss_topic].has(ELLIPSOID)):
         return {}
     table = flight[gnss_topic].unique_times()

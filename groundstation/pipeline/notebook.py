@@ -147,7 +147,7 @@ class OpenFlight(ABC):
         return self.answer(GroundDeviation)
 
     def trajectory(self) -> BestTrajectory:
-        """Return the best trajectory: its state, accuracy, checks, and the errors of the on-board filter.
+        """Return the best trajectory: state, accuracy, checks, errors of the on-board filter.
 
         :meth:`states` has the trajectory itself. Raises as :meth:`heading`.
         """

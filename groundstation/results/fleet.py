@@ -22,7 +22,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
 TrendQuantity = Literal[
-    "error_deg", "radial_error_rate_fit_nmiph", "health_vibration_mps2", "health_hdop", "health_test_ratio"
+    "error_deg",
+    "radial_error_rate_fit_nmiph",
+    "health_vibration_mps2",
+    "health_hdop",
+    "health_test_ratio",
+    "onboard_heading_rms_deg",
+    "onboard_tilt_rms_deg",
 ]
 WHOLE_FLEET = ""  # where an aircraft is named and all of them are meant
 

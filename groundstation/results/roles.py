@@ -250,9 +250,9 @@ class ErrorsAlongTheFlight:
 
 
 class StatesAlongTheFlight:
-    """Role of an answer with position, velocity and attitude along the flight, and their sigmas.
+    """Role of an answer with position, velocity and attitude along the flight.
 
-    ``states_name`` is that of its track and table.
+    Their sigmas stand beside them. ``states_name`` is that of its track and table.
     """
 
     states_name: ClassVar[str]
@@ -279,12 +279,25 @@ class StatesAlongTheFlight:
 
     @property
     def gnss_latency(self) -> tuple[float, float] | None:
-        """Delay of the receiver behind the inertial unit and its sigma, s; None where it is not observable."""
+        """Delay of the receiver behind the inertial unit and its sigma, s.
+
+        None where it is not observable.
+        """
+        raise NotImplementedError
+
+    def velocity_latency(self, ins_topic: str) -> tuple[float, float] | None:
+        """Return the delay of GNSS velocities behind the output of an INS and its sigma, s.
+
+        None where the log does not show it.
+        """
         raise NotImplementedError
 
     @property
     def antenna_arm_m(self) -> tuple[float, float, float]:
-        """Antenna from the point of the states: forward, right, down; 0 where it is not observable."""
+        """Antenna from the point of the states: forward, right, down.
+
+        It is 0 where it is not observable.
+        """
         raise NotImplementedError
 
     def body_states(self) -> BodyStates | None:

@@ -21,6 +21,8 @@ QUANTITIES: Mapping[str, tuple[str, str, int]] = {  # title, unit, decimals
     "health_vibration_mps2": ("vibration in the air", "m/s²", 2),
     "health_hdop": ("HDOP in the air", "", 2),
     "health_test_ratio": ("largest innovation test ratio", "", 2),
+    "onboard_heading_rms_deg": ("heading error of the on-board filter, RMS", "°", 2),
+    "onboard_tilt_rms_deg": ("tilt error of the on-board filter, RMS", "°", 2),
 }
 
 
@@ -30,9 +32,9 @@ def title_of(quantity: str) -> str:
 
 
 def figure_of(quantity: str, value: float | None) -> str:
-    """Return a value of a quantity with its unit; angles carry their sign."""
+    """Return a value of a quantity with its unit; angles that may be negative carry their sign."""
     _, unit, places = QUANTITIES.get(quantity, (*named_quantity(quantity), 3))
-    return bounded(value, places, unit, signed=unit in "°′")
+    return bounded(value, places, unit, signed=unit in "°′" and not quantity.endswith("_rms_deg"))
 
 
 def bounded(value: float | None, places: int, unit: str = "", *, signed: bool = False) -> str:

@@ -19,6 +19,8 @@ QUANTITIES = {
     "health_vibration_mps2": "m/s²",
     "health_hdop": "HDOP",
     "health_test_ratio": "test ratio",
+    "onboard_heading_rms_deg": "heading of the filter, °",
+    "onboard_tilt_rms_deg": "tilt of the filter, °",
 }
 LEAD = "Has an aircraft changed? Every flight in order of time against the level of its aircraft."
 

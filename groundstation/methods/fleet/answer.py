@@ -28,7 +28,10 @@ FloatArray = NDArray[np.float64]
 PIT_BINS = 10
 
 # Figures that are positive and skewed are judged by their logarithm.
-OF_AUTOPILOTS: tuple[TrendQuantity, ...] = ("health_vibration_mps2", "health_hdop", "health_test_ratio")
+OF_AUTOPILOTS: tuple[TrendQuantity, ...] = (
+    *("health_vibration_mps2", "health_hdop", "health_test_ratio"),
+    *("onboard_heading_rms_deg", "onboard_tilt_rms_deg"),
+)
 POSITIVE = {
     *("standard_error_deg", "estimate_sd_deg", "radial_error_rate_fit_nmiph", "forecast_60min_rms_m"),
     *OF_AUTOPILOTS,
@@ -45,6 +48,8 @@ LOOKED_AT: Mapping[str, str] = {
     "health_vibration_mps2": "vibration in the air, m/s2",
     "health_hdop": "HDOP in the air",
     "health_test_ratio": "largest innovation test ratio",
+    "onboard_heading_rms_deg": "heading error of the on-board filter, RMS, deg",
+    "onboard_tilt_rms_deg": "tilt error of the on-board filter, RMS, deg",
 }
 CHECKS: Mapping[str, str] = {
     "reference": "corrected parking heading against its reference",
@@ -55,6 +60,7 @@ CHECKS: Mapping[str, str] = {
     "truth_ins": "INS position against it",
     "truth_corrected": "INS less its estimated errors against it",
     "truth_smoothed": "INS less its smoothed errors against it",
+    "truth_trajectory": "best trajectory against it",
 }
 
 

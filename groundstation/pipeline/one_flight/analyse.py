@@ -143,12 +143,22 @@ def answers_of(flight: Flight, configuration: Configuration) -> tuple[Answered, 
     """
     seen = flight.without(TRUTH)
     known = known_of(seen, configuration)
-    found = run_analyses(tuple(one for one in systems().analyses if not one.judges), seen, known)
+    every = tuple(_refused(one) if one.name in configuration.without else one for one in systems().analyses)
+    found = run_analyses(tuple(one for one in every if not one.judges), seen, known)
     so_far = replace(known, answers=found.answers, workings=found.workings)
-    judged = run_analyses(tuple(one for one in systems().analyses if one.judges), flight, so_far)
+    judged = run_analyses(tuple(one for one in every if one.judges), flight, so_far)
     if not topics_of_kind(TRUTH, flight.topics()):
         judged = replace(judged, not_assessable=())  # no truth was given: no reason is needed
     return found.joined(judged), known
+
+
+def _refused(analysis: Analysis) -> Analysis:
+    """Return the analysis as one that the user leaves out."""
+
+    def run(_data: Any, _known: Any, _settings: Any) -> Found[Any]:
+        raise NotAssessableError(analysis.subject, "left out (--without)")
+
+    return replace(analysis, run=run, is_expected=lambda _data, _known: False)
 
 
 def known_of(flight: Flight, configuration: Configuration) -> Known:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 ISOLATION = "isolation"  # the table that changes no result: it is not kept
 S = TypeVar("S")
-LISTS = ("exclude", "force", "weather")  # what a settings file may hold besides tables
+LISTS = ("exclude", "force", "weather", "without")  # what a settings file may hold besides tables
 Settings = Path | Mapping[str, Any]  # a TOML file, or its content
 
 
@@ -140,6 +140,8 @@ class Configuration:
         METAR lines; each flight takes the wind of the one nearest to its taxi.
     lessons : tuple of Lesson, optional
         What earlier flights say of installations, from an installations.json.
+    without : tuple of str
+        Analyses that are left out.
 
     Raises
     ------
@@ -157,6 +159,7 @@ class Configuration:
     references: References = NO_REFERENCES
     weather: tuple[str, ...] = ()
     lessons: "tuple[Lesson, ...] | None" = None
+    without: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         self.thresholds  # noqa: B018 -- raises now if a value is wrong
@@ -228,6 +231,8 @@ class Configuration:
             document["apply"] = self.apply.to_dict()
         if self.weather:
             document["weather"] = list(self.weather)
+        if self.without:
+            document["without"] = list(self.without)
         if self.references.paths:
             document["references"] = [path.name for path in self.references.paths]
         return document
@@ -254,6 +259,7 @@ def load_configuration(
     thresholds: Settings | None = None,
     icds: Iterable[str] | None = None,
     weather: Settings | None = None,
+    without: Iterable[str] | None = None,
 ) -> Configuration:
     """Put the user's settings, files or their content, into one configuration.
 
@@ -290,7 +296,22 @@ def load_configuration(
         icds=tuple(icds or ()),
         files={name: str(path) for name, path in files.items() if isinstance(path, Path)},
         weather=_weather(document.get("weather", []), weather, _name(config)),
+        without=_left_out(document.get("without", []), without, _name(config)),
     )
+
+
+def _left_out(listed: Any, given: Iterable[str] | None, name: str) -> tuple[str, ...]:
+    """Return the names of the analyses that are left out, of a settings file and of the command line."""
+    from groundstation.systems import systems
+
+    if not isinstance(listed, list) or not all(isinstance(one, str) for one in listed):
+        raise SettingsError(f"{name}, without", repr(listed), "a list of names of analyses")
+    known = [analysis.name for analysis in systems().analyses]
+    found = tuple(dict.fromkeys([*listed, *(given or ())]))
+    for one in found:
+        if one not in known:
+            raise SettingsError("without", repr(one), f"one of {', '.join(known)}")
+    return found
 
 
 def installed_as(configuration: Configuration, installation: Path | None) -> Configuration:

@@ -179,7 +179,8 @@ def keys_of(source: Source, configuration: Configuration, *, digests: Sequence[s
     intervals = [[asdict(part) for part in listed] for listed in (configuration.exclude, configuration.force)]
     apply = None if configuration.apply is None else asdict(configuration.apply)
     lessons = [] if configuration.lessons is None else [[asdict(one) for one in configuration.lessons]]
-    analysis = digest_of_parts(conversion, tables, intervals, apply, configuration.weather, *lessons)
+    left_out = [list(configuration.without)] if configuration.without else []
+    analysis = digest_of_parts(conversion, tables, intervals, apply, configuration.weather, *lessons, *left_out)
     return Keys(conversion, analysis)
 
 

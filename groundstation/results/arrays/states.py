@@ -18,9 +18,9 @@ WRAPPED = {"longitude_deg": wrap_180, "roll_deg": wrap_180, "heading_deg": wrap_
 
 
 class Between(NamedTuple):
-    """Places of times between neighbours of one segment: the two rows and the share of the second.
+    """Places of times between neighbours of one segment.
 
-    The share is NaN where ``is_inside`` is false.
+    They are the two rows and the share of the second. The share is NaN where ``is_inside`` is false.
     """
 
     left: NDArray[np.intp]

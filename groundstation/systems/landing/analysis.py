@@ -14,6 +14,7 @@ from groundstation.results.answer import Answers, answer_of
 from groundstation.results.arrays.typed import joined
 from groundstation.results.figures import FigureData
 from groundstation.results.landing_categories import ACCURACY_ONLY, axis_category_met
+from groundstation.results.roles import StatesAlongTheFlight
 from groundstation.systems.analysis import Analysis, Found, RestsOn, Rules, Shortfall, main_numbers
 from groundstation.systems.known import Known
 from groundstation.systems.landing.answer import (
@@ -72,7 +73,8 @@ class _Told:
 
 def _run(flight: "Flight", known: Known, settings: LandingSettings) -> Found[LandingResult]:
     path, finals, left_out = _finals(flight, known, settings)
-    told = [_approach(number, flight, path, final, settings) for number, final in enumerate(finals, 1)]
+    estimated = known.answer_meeting(StatesAlongTheFlight)
+    told = [_approach(number, flight, path, final, settings, estimated) for number, final in enumerate(finals, 1)]
     approaches = tuple(one.approach for one in told)
     answer = LandingResult(
         approaches=approaches,
@@ -130,7 +132,14 @@ def _figures(told: Sequence[_Told]) -> tuple[FigureData, ...]:
     return joined([one.path for one in told]), *([joined(levels)] if levels else [])
 
 
-def _approach(number: int, flight: "Flight", path: FlightPath, final: Final, settings: LandingSettings) -> _Told:
+def _approach(
+    number: int,
+    flight: "Flight",
+    path: FlightPath,
+    final: Final,
+    settings: LandingSettings,
+    estimated: StatesAlongTheFlight | None,
+) -> _Told:
     runway = runway_of(path, final, settings)
     relative = relative_to_runway(path, final, runway)
     height = relative.height_m[relative.is_final]
@@ -155,7 +164,7 @@ def _approach(number: int, flight: "Flight", path: FlightPath, final: Final, set
         runway=runway,
         established=_guided_part(path, final, relative),
         sensitivity=sensitivity,
-        touchdown=touchdown_of(flight, path, final, runway, relative) if lands else None,
+        touchdown=touchdown_of(flight, path, final, runway, relative, estimated) if lands else None,
         stabilised=stabilised(path, relative, settings),
         position_errors=errors,
         protection=None if protection is None else protection[0],
@@ -351,6 +360,7 @@ LANDING = Analysis(
     settings=LandingSettings,
     answer=LandingResult,
     run=_run,
+    builds_on=("trajectory",),
     is_expected=_is_expected,
     rests_on=_rests_on,
     sentence=_sentence,

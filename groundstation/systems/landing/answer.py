@@ -12,6 +12,7 @@ PlacedBy = Literal["site file", "positions"]
 Measured = Literal["measured", "not measured"]
 GLIDE_SLOPE_DOT = 0.12  # a dot is so much of the glide angle (ICAO Annex 10, volume I, 3.1.5.6.2)
 SINK_S = 3.0  # before the touchdown, over which the sink rate is taken
+LAST_SINK_S = 0.5  # the same behind the flare, where the best trajectory shows it
 PEAK_S = 2.0  # about the touchdown, within which the peak load is sought
 
 
@@ -48,6 +49,32 @@ class RunwayUsed:
 
 
 @dataclass(frozen=True, kw_only=True)
+class TouchdownByStates:
+    """Touchdown by states from raw inertial data, at the same time.
+
+    Parameters
+    ----------
+    words : str
+        "by the best trajectory (heading to 0.3 deg)".
+    sink_rate_mps, sink_rate_sigma_mps : float
+        Over the last ``SINK_S`` before it.
+    last_sink_rate_mps : float
+        Over the last ``LAST_SINK_S``: behind the flare.
+    past_threshold_m : float or None
+        Of the antenna along the runway; None where the threshold itself was placed by the touchdown.
+    past_threshold_sigma_m : float
+        Of the position alone; the time of the touchdown has a sigma of its own.
+    """
+
+    words: str
+    sink_rate_mps: float
+    sink_rate_sigma_mps: float
+    last_sink_rate_mps: float
+    past_threshold_m: float | None
+    past_threshold_sigma_m: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Touchdown:
     """Place, time and manner in which the wheels met the ground.
 
@@ -63,6 +90,8 @@ class Touchdown:
         Greatest normal acceleration within ``PEAK_S`` of it.
     rollout_course_deg : float or None
         True direction of the line through the positions of the roll-out.
+    by_states : TouchdownByStates or None
+        The same by the best trajectory, where its checks hold.
     """
 
     time_s: float
@@ -75,6 +104,7 @@ class Touchdown:
     sink_rate_mps: float | None
     peak_load_g: float | None
     rollout_course_deg: float | None
+    by_states: TouchdownByStates | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

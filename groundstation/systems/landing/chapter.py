@@ -3,6 +3,7 @@
 How each was flown, where it touched down, and what shows accuracy.
 """
 
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import DOTS_PER_FULL_SCALE
 from groundstation.chapters.chapter import Remedies
 from groundstation.chapters.gates import limit_text, setting_facts, state_of
@@ -37,6 +38,7 @@ from groundstation.chapters.wording import (
 from groundstation.results.flight import FlightResults
 from groundstation.systems.landing.answer import (
     GLIDE_SLOPE_DOT,
+    LAST_SINK_S,
     PEAK_S,
     SINK_S,
     Approach,
@@ -44,6 +46,7 @@ from groundstation.systems.landing.answer import (
     LandingResult,
     PositionError,
     StabilisedAt,
+    TouchdownByStates,
 )
 
 LEAD = "How each approach was flown against its runway, and where it touched down."
@@ -271,8 +274,24 @@ def _touchdown(one: Approach) -> Facts | None:
         ("Sink rate", number(down.sink_rate_mps, 2, "m/s"), SINK_TIME),
         ("Peak normal acceleration", number(down.peak_load_g, 2, "g"), PEAK_TIME),
         ("Course of the roll-out", number(down.rollout_course_deg, 1, "°"), "line through its positions, true"),
+        *_by_states(down.by_states),
     ]
     return Facts(f"Approach {one.number}: touchdown", tuple(pairs))
+
+
+def _by_states(down: TouchdownByStates | None) -> tuple[tuple[str, str, str], ...]:
+    """Return the touchdown by the best trajectory, set beside what is recorded."""
+    if down is None:
+        return ()
+    sink = f"{number(down.sink_rate_mps, 2)} ± {number(NORMAL_95 * down.sink_rate_sigma_mps, 2, 'm/s')}"
+    told = [
+        ("Sink rate of the trajectory", sink, f"{SINK_TIME}, {down.words}; ±: 95 %"),
+        ("Sink rate behind the flare", number(down.last_sink_rate_mps, 2, "m/s"), f"over the last {LAST_SINK_S:g} s"),
+    ]
+    if down.past_threshold_m is not None:
+        place = f"{number(down.past_threshold_m, 1)} ± {number(NORMAL_95 * down.past_threshold_sigma_m, 1, 'm')}"
+        told.append(("Antenna beyond the threshold", place, f"{down.words}; ±: 95 %, the time taken as exact"))
+    return tuple(told)
 
 
 def _error(one: Approach, error: PositionError) -> Grid | Facts | None:

@@ -8,7 +8,15 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.geodesy import continuous_longitude_deg
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import MPS2_PER_G
-from groundstation.systems.landing.answer import PEAK_S, SINK_S, RunwayUsed, Touchdown
+from groundstation.results.roles import StatesAlongTheFlight
+from groundstation.systems.landing.answer import (
+    LAST_SINK_S,
+    PEAK_S,
+    SINK_S,
+    RunwayUsed,
+    Touchdown,
+    TouchdownByStates,
+)
 from groundstation.systems.landing.finals import Final
 from groundstation.systems.landing.geometry import RelativeToRunway, along_and_across, line_through
 from groundstation.systems.landing.path import FlightPath, slope
@@ -18,12 +26,21 @@ if TYPE_CHECKING:
 
 LOAD_RANGE_G = (-1.0, 4.0)  # beyond it a sample is a fault of the recorder
 SPIKE_G = 1.5  # of one sample against both its neighbours
+STEPS = 61  # at which the sink rate of states is taken, every 0.05 s
 
 
 def touchdown_of(
-    flight: "Flight", path: FlightPath, final: Final, runway: RunwayUsed, relative: RelativeToRunway
+    flight: "Flight",
+    path: FlightPath,
+    final: Final,
+    runway: RunwayUsed,
+    relative: RelativeToRunway,
+    estimated: StatesAlongTheFlight | None = None,
 ) -> Touchdown:
-    """Measure the touchdown that a final ends in."""
+    """Measure the touchdown that a final ends in.
+
+    It is also told by the states of an estimate whose checks hold.
+    """
     at_s = final.end.time_s
     places = path.latitude_deg, continuous_longitude_deg(path.longitude_deg)
     latitude, longitude = (float(np.interp(at_s, path.time_s, one)) for one in places)
@@ -45,6 +62,28 @@ def touchdown_of(
         sink_rate_mps=_sink_rate(flight, path, at_s),
         peak_load_g=_peak_load(flight, at_s),
         rollout_course_deg=course,
+        by_states=None if estimated is None else _by_states(estimated, runway, at_s),
+    )
+
+
+def _by_states(estimated: StatesAlongTheFlight, runway: RunwayUsed, at_s: float) -> TouchdownByStates | None:
+    """Return the touchdown by the states of the antenna; None where they do not reach to it."""
+    states = estimated.states_at_antenna() if estimated.is_reference else None
+    if states is None or not len(states):
+        return None
+    before = states.at(np.linspace(at_s - SINK_S, at_s, STEPS))
+    if not np.isfinite(before.velocity_down_mps).all():
+        return None
+    distance_m, _across = along_and_across(before.latitude_deg[-1:], before.longitude_deg[-1:], runway)
+    sigma = before.velocity_down_sigma_mps
+    place_m = np.hypot(before.position_north_sigma_m[-1], before.position_east_sigma_m[-1]) / np.sqrt(2.0)
+    return TouchdownByStates(
+        words=estimated.by_it,
+        sink_rate_mps=float(np.mean(before.velocity_down_mps)),
+        sink_rate_sigma_mps=float(np.sqrt(np.mean(np.square(sigma)))),
+        last_sink_rate_mps=float(np.mean(before.velocity_down_mps[before.time_s >= at_s - LAST_SINK_S])),
+        past_threshold_m=-float(distance_m[0]) if runway.placed_by == "site file" else None,
+        past_threshold_sigma_m=float(place_m),
     )
 
 

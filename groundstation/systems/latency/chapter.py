@@ -5,7 +5,7 @@ from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Part, Rank, Section, kept
 from groundstation.chapters.wording import interval, number, significant, typeset
 from groundstation.results.flight import FlightResults
-from groundstation.systems.latency.agreement_answer import latency_agreement
+from groundstation.systems.latency.agreement_answer import latency_agreement, trajectory_agreement
 from groundstation.systems.latency.answer import Latencies, Latency
 
 TITLE = "Latency between sensors"
@@ -33,7 +33,9 @@ def latency(results: FlightResults) -> Section | None:
         parts: tuple[Part, ...] = (Facts("Not observable", unseen), Figure("latency.search"))
         return Section("latency", TITLE, LEAD, parts, headline, is_open=True)
     twice = agreement_note(latency_agreement(results.answers))
-    return Section("latency", TITLE, LEAD, kept((twice, table, Figure("latency.search"))), headline, claim=told)
+    thrice = agreement_note(trajectory_agreement(results.answers))
+    shown = kept((twice, thrice, table, Figure("latency.search")))
+    return Section("latency", TITLE, LEAD, shown, headline, claim=told)
 
 
 def _claim(answer: Latencies) -> Claim | None:

@@ -20,6 +20,7 @@ SUBJECTS: dict[str, str] = {
     "ins": "INS",
     "corrected": "INS, filtered",
     "smoothed": "INS, smoothed",
+    "trajectory": "best trajectory",
     "heading": "INS less the error found",
 }
 

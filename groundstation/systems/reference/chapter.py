@@ -153,7 +153,8 @@ def _claims(answer: ReferenceResult) -> Grid | None:
     caption = (
         "Share of the errors inside the 95 % that subject and reference claim together. A lasting error counts once, "
         "however long it lasts. σ: RMS over the flight; for a horizontal error, north and east together. A subject "
-        "without σ claims nothing and is left out; a reference without σ counts as exact."
+        "without σ claims nothing and is left out; a reference without σ counts as exact. The attitude of a trajectory "
+        "from raw inertial data is judged about its mean: how its unit stands to that of the reference is not known."
     )
     return Grid("Claimed against seen", heads, cells, caption, ("reference_checks",)) if cells else None
 

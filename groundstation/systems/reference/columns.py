@@ -51,6 +51,18 @@ REFERENCE_COLUMNS: tuple[AnswerColumn[ReferenceResult], ...] = (
         lambda answer: _rmse(answer, "corrected", "position", "horizontal"),
     ),
     AnswerColumn(
+        "trajectory_reference_rmse_m",
+        "number",
+        "best trajectory against the reference, horizontal",
+        lambda answer: _rmse(answer, "trajectory", "position", "horizontal"),
+    ),
+    AnswerColumn(
+        "trajectory_heading_reference_rmse_deg",
+        "number",
+        "its heading against the reference, mounting in it",
+        lambda answer: _rmse(answer, "trajectory", "attitude", "heading"),
+    ),
+    AnswerColumn(
         "heading_reference_rmse_deg",
         "number",
         "INS heading against the reference",

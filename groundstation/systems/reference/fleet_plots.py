@@ -19,6 +19,7 @@ SHORT = {
     "truth_ins": "INS position",
     "truth_corrected": "INS, filtered",
     "truth_smoothed": "INS, smoothed",
+    "truth_trajectory": "best trajectory",
 }
 
 

@@ -12,14 +12,14 @@ import numpy as np
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import kind_of, topics_of_kind
 from groundstation.base.units import NS_PER_S
-from groundstation.results.roles import ErrorsAlongTheFlight, ForecastOfErrors, HeadingByTrack
+from groundstation.results.roles import ErrorsAlongTheFlight, ForecastOfErrors, HeadingByTrack, StatesAlongTheFlight
 from groundstation.systems.analysis import Found
 from groundstation.systems.known import Known
 from groundstation.systems.reference.answer import ErrorRow, ForecastCheck, Placed, ReferenceResult
 from groundstation.systems.reference.answers import forecast_checks, heading_check
 from groundstation.systems.reference.errors import FIELDS, Errors, errors_of
 from groundstation.systems.reference.figures import checks_figure, errors_figure, track_figure
-from groundstation.systems.reference.judging import CheckedClaim, axes_of, checked, error_row
+from groundstation.systems.reference.judging import CheckedClaim, axes_of, checked, error_row, without_mounting
 from groundstation.systems.reference.paths import path_rows, relative_rows
 from groundstation.systems.reference.placing import gross_offset_s, place
 from groundstation.systems.reference.settings import ReferenceSettings
@@ -129,8 +129,13 @@ def _answer(
     standing: Standing,
     settings: ReferenceSettings,
 ) -> tuple[ReferenceResult, list[CheckedClaim]]:
+    estimated = known.answer_meeting(StatesAlongTheFlight)
+    of_own_unit = "" if estimated is None else estimated.states_name
     claims = [
-        found for one in listed for axis in axes_of(one, settings) if axis.sigma and (found := checked(one, axis))
+        found
+        for one in listed
+        for axis in axes_of(one, settings)
+        if axis.sigma and (found := checked(one, without_mounting(axis) if one.subject == of_own_unit else axis))
     ]
     heading = known.answer_meeting(HeadingByTrack)
     headings = [] if heading is None else [heading_check(heading, one) for one in as_logged]

@@ -1,7 +1,7 @@
 """Rows of the answer: errors along every axis with their statistics, claimed against seen."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -84,6 +84,17 @@ def _about_its_mean(angle_deg: FloatArray) -> FloatArray:
     known = angle_deg[np.isfinite(angle_deg)]
     middle = float(np.rad2deg(np.angle(np.mean(np.exp(1j * np.deg2rad(known))))))
     return middle + np.where(np.isfinite(angle_deg), wrap_180(np.nan_to_num(angle_deg) - middle), np.nan)
+
+
+def without_mounting(axis: JudgedAxis) -> JudgedAxis:
+    """Return an angle less its mean; another axis as it is.
+
+    The mean of a subject that has a unit of its own is how that unit stands to the reference's: nobody claims it.
+    """
+    if axis.quantity != "attitude":
+        return axis
+    values = axis.values - np.nanmean(axis.values)
+    return replace(axis, values=values, parts=values[:, None])
 
 
 def error_row(errors: Errors, axis: JudgedAxis, settings: ReferenceSettings) -> ErrorRow:

@@ -1,5 +1,6 @@
 """Answer of the best trajectory: state, accuracy, checks, errors of the on-board filter."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -463,9 +464,25 @@ class BestTrajectory(Answer, StatesAlongTheFlight, ErrorsOfFilter):
 
     @property
     def gnss_latency(self) -> tuple[float, float] | None:
-        """Delay of the receiver behind the inertial unit and its sigma, s; None where it is not observable."""
+        """Delay of the receiver behind the inertial unit and its sigma, s.
+
+        None where it is not observable.
+        """
         found = self.parameter(LATENCY)
         return None if found is None or not found.is_observable else (found.value, found.sigma)
+
+    def velocity_latency(self, ins_topic: str) -> tuple[float, float] | None:
+        """Return the delay of GNSS velocities behind the output of an INS and its sigma, s.
+
+        Both stand against the inertial unit. None where the log does not show it, or the filter is another one's.
+        """
+        filter_, latency, lag = self.onboard, self.gnss_latency, self.parameter(VELOCITY_LAG)
+        if filter_ is None or filter_.topic != ins_topic or filter_.delay_s is None or latency is None:
+            return None
+        value, sigma = latency
+        if lag is not None:
+            value, sigma = value + lag.value, math.hypot(sigma, lag.sigma)
+        return value - filter_.delay_s, math.hypot(sigma, filter_.delay_sigma_s or 0.0)
 
     @property
     def antenna_arm_m(self) -> tuple[float, float, float]:

@@ -36,6 +36,7 @@ from groundstation.systems.trajectory.wording_answer import (
 
 TITLE = "Best trajectory"
 LEAD = "Where the vehicle was, how it stood and where it pointed, by all data before and after, and how sure that is."
+MOST_HYPOTHESES = 4
 SOURCES = {
     "stated": "stated in the aircraft file",
     "logged": "logged",
@@ -112,7 +113,7 @@ def _hypotheses(answer: BestTrajectory) -> Grid | None:
             number(one.end_heading_deg, 1, "°"),
             number(one.below_best, 1),
         )
-        for place, one in enumerate(answer.hypotheses)
+        for place, one in enumerate(answer.hypotheses[:MOST_HYPOTHESES])
     ]
     caption = "Below the best: log-likelihood; a difference above 10 would decide."
     return Grid("Hypotheses of the heading", heads, rows, caption)

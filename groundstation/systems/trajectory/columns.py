@@ -17,7 +17,10 @@ def _median_sigma(quantity: Quantity) -> Callable[[BestTrajectory], float | None
 
 
 def _onboard_rms(*quantities: Quantity) -> Callable[[BestTrajectory], float | None]:
-    """Return the RMS error of the on-board filter, the larger of several; None where the answer is not accepted."""
+    """Return the RMS error of the on-board filter, the larger of several.
+
+    None where the answer is not accepted.
+    """
 
     def of(answer: BestTrajectory) -> float | None:
         if answer.onboard is None or not answer.is_reference:

@@ -267,6 +267,7 @@ def estimate(
     may_roll: bool = False,
     may_stop: bool = True,
     prior: Model | None = None,
+    sigmas: StartSigmas | None = None,
     fit: bool = True,
     latency_s: float = 0.0,
     lag_s: float = 0.0,
@@ -282,6 +283,8 @@ def estimate(
         It may stand still on its way.
     prior : Model, optional
         Numbers of the class.
+    sigmas : StartSigmas, optional
+        Of the constants at the start.
     fit : bool
         False: the numbers of ``prior`` as they are.
     latency_s, lag_s : float
@@ -289,6 +292,8 @@ def estimate(
     """
     model = Model() if prior is None else prior
     problem = replace(pose(imu, gnss, may_stop=may_stop), latency_s=latency_s, lag_s=lag_s)
+    if sigmas is not None:
+        problem = replace(problem, sigmas=sigmas)
     open_gate, rules = gate(OPEN_SIGMAS), gate(CLOSED_SIGMAS)
     first = hypotheses_of(problem, model, open_gate)
     problem, start, done = settle(problem, model, open_gate, first[0].start, LATENCY_ROUNDS)

@@ -52,6 +52,7 @@ from groundstation.systems.trajectory.strapdown import (
     grow_transition,
     mechanise,
     rotation_of,
+    shorter_way,
     turn_before,
 )
 
@@ -220,7 +221,7 @@ def close(e: int, line: Line, now: Now, room: Room, linear: Linear) -> None:
     else:
         wanted = line.nav[e]
         by[0] = (wanted[0] - nav[0]) * (north + nav[2])
-        by[1] = (wanted[1] - nav[1]) * (east + nav[2]) * math.cos(nav[0])
+        by[1] = shorter_way(wanted[1] - nav[1]) * (east + nav[2]) * math.cos(nav[0])
         by[2] = nav[2] - wanted[2]
         by[3] = wanted[3] - nav[3]
         by[4] = wanted[4] - nav[4]

@@ -211,7 +211,7 @@ def _motion(imu: ImuIncrements, steps: Steps, settings: MountingSettings) -> _Mo
     spans = spans_of(steps, sums, settings)
     if len(spans) < settings.spans_min:
         return MountingEvidence(len(spans))
-    every = ranked(spans, sums, settings)
+    every = tuple(one for one in ranked(spans, sums, settings) if not _is_hidden(one, steps, spans, settings))
     sound = next(one for one in every if one.is_sound)
     rival = next(one for one in every if not one.is_sound)
     relation = relation_of(spans, sums, settings, sound)
@@ -226,6 +226,20 @@ def _motion(imu: ImuIncrements, steps: Steps, settings: MountingSettings) -> _Mo
         return _refused(UNRELATED, evidence) if moves else evidence
     doubt = _explained(every, settings) if margin <= -settings.margin_doubt else ""
     return _Motion(steps, spans, sums, sound, evidence, doubt)
+
+
+def _is_hidden(one: Explanation, steps: Steps, spans: Spans, settings: MountingSettings) -> bool:
+    """Tell whether an explanation mirrors an axis of the accelerometers that carries no force.
+
+    An aeroplane in coordinated turns has none to the side: the sign of that axis then shows nothing but its bias.
+    """
+    mirror = -one.gyro_turn
+    if one.is_right_handed or one.turns_alike or np.trace(mirror) != 1.0 or (mirror != mirror.T).any():
+        return False
+    along = 0.5 * (np.eye(3) - mirror)  # the mirrored axis times itself
+    places = (spans.first[:, None] + np.arange(settings.steps)).ravel()
+    force = np.linalg.norm(steps.force_mps2[places] @ along, axis=1)
+    return float(np.sqrt(np.nanmean(force**2))) < settings.hidden_force_mps2
 
 
 def _explained(every: tuple[Explanation, ...], settings: MountingSettings) -> str:

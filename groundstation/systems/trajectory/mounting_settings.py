@@ -27,6 +27,7 @@ class MountingSettings:
     spans_min: int = number(4, 2, 1000)  # fewer tell nothing
     margin_min: float = number(5.0, 0.5, 1000.0)  # log units by which an unsound explanation is likelier: refused
     margin_doubt: float = number(1.5, 0.1, 1000.0)  # likewise: told as a doubt
+    hidden_force_mps2: float = number(0.6, 0.0, 10.0)  # RMS along an axis whose sign a bias of 50 mg hides
     over_others_min: float = number(10.0, 1.0, 1000.0)  # log units over other times of GNSS
     unexplained_max: float = number(0.35, 0.01, 1.0)  # of the variance of GNSS's changes of velocity
     misfit_max_mps: float = number(1.0, 0.01, 100.0)  # RMS of a change of velocity in a step

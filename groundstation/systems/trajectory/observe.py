@@ -33,7 +33,7 @@ from groundstation.systems.trajectory.states import (
     Room,
     Seen,
 )
-from groundstation.systems.trajectory.strapdown import normal_gravity
+from groundstation.systems.trajectory.strapdown import normal_gravity, shorter_way
 
 NO_ROW = 1e9  # innovation of a scalar that a measurement does not have
 
@@ -42,7 +42,7 @@ NO_ROW = 1e9  # innovation of a scalar that a measurement does not have
 def _arm(m: int, seen: Seen, now: Now, room: Room) -> None:
     """Fill ``room.step``: arm of the antenna in n, its velocity beside the unit's, acceleration, rate in b.
 
-    They stand at 16, 19, 22 and 25, three each.
+    They stand at 16, 19, 22 and 25, three each; gravity at 15.
     """
     C, step, value = room.C, room.step, now.value
     x, y, z = value[LEV], value[LEV + 1], value[LEV + 2]
@@ -61,7 +61,8 @@ def _arm(m: int, seen: Seen, now: Now, room: Room) -> None:
         step[16 + i] = C[i, 0] * x + C[i, 1] * y + C[i, 2] * z
         step[19 + i] = C[i, 0] * ux + C[i, 1] * uy + C[i, 2] * uz
         step[22 + i] = C[i, 0] * fx + C[i, 1] * fy + C[i, 2] * fz
-    step[24] += normal_gravity(math.sin(now.nav[0]), now.nav[2])
+    step[15] = normal_gravity(math.sin(now.nav[0]), now.nav[2])
+    step[24] += step[15]
     step[25], step[26], step[27] = wx, wy, wz
 
 
@@ -72,17 +73,17 @@ def _put(room: Room, i: int, e: int, column: int, value: float) -> None:
 
 
 @inlined
-def _cross_row(room: Room, i: int, first: int, n: float, e: float, d: float, sign: float) -> None:
-    """Put row i of ``sign`` times the matrix that turns phi into phi x (n, e, d)."""
+def _cross_row(room: Room, i: int, first: int, n: float, e: float, d: float) -> None:
+    """Put row i of the matrix that turns phi into phi x (n, e, d)."""
     if i == 0:
-        _put(room, 0, first, ATT + 1, sign * d)
-        _put(room, 0, first + 1, ATT + 2, -sign * e)
+        _put(room, 0, first, ATT + 1, d)
+        _put(room, 0, first + 1, ATT + 2, -e)
     elif i == 1:
-        _put(room, 1, first, ATT, -sign * d)
-        _put(room, 1, first + 1, ATT + 2, sign * n)
+        _put(room, 1, first, ATT, -d)
+        _put(room, 1, first + 1, ATT + 2, n)
     else:
-        _put(room, 2, first, ATT, sign * e)
-        _put(room, 2, first + 1, ATT + 1, -sign * n)
+        _put(room, 2, first, ATT, e)
+        _put(room, 2, first + 1, ATT + 1, -n)
 
 
 @inlined
@@ -97,32 +98,44 @@ def observe(m: int, seen: Seen, now: Now, room: Room) -> None:
         for e in range(WIDTH):
             room.columns[i, e] = 0
             room.h[i, e] = 0.0
-    back = seen.back_s[m]
-    late = value[LAT]
-    if kind in (POSITION, VELOCITY):
+    if kind <= VELOCITY:  # or position
         _arm(m, seen, now, room)
+        since = seen.back_s[m] + value[LAT]  # so much before the epoch
+        if kind == VELOCITY:
+            since += value[LAG]
+        wx, wy, wz = step[25], step[26], step[27]
+        fn, fe, fd = step[22], step[23], step[24] - step[15]
         for i in range(3):
             change = step[22 + i]
             speed = nav[3 + i] + step[19 + i]
+            # what the velocity beside the unit's changes by with the arm
+            lx, ly, lz = C[i, 1] * wz - C[i, 2] * wy, C[i, 2] * wx - C[i, 0] * wz, C[i, 0] * wy - C[i, 1] * wx
             if kind == POSITION:
-                offset = step[16 + i] - speed * (back + late) + 0.5 * change * back * back
-                offset += value[SLOW + i] + value[FAST + i]
-                y[i] = -offset
+                y[i] = speed * since - step[16 + i] - 0.5 * change * since * since - value[SLOW + i] - value[FAST + i]
+                half = 0.5 * since * since
+                _cross_row(
+                    room,
+                    i,
+                    1,
+                    step[16] - since * step[19] + half * fn,
+                    step[17] - since * step[20] + half * fe,
+                    step[18] - since * step[21] + half * fd,
+                )
                 _put(room, i, 0, POS + i, 1.0)
-                _cross_row(room, i, 1, step[16], step[17], step[18], 1.0)
-                for j in range(3):
-                    _put(room, i, 3 + j, LEV + j, C[i, j])
-                _put(room, i, 6, LAT, -speed)
+                _put(room, i, 3, LEV, C[i, 0] - since * lx)
+                _put(room, i, 4, LEV + 1, C[i, 1] - since * ly)
+                _put(room, i, 5, LEV + 2, C[i, 2] - since * lz)
+                _put(room, i, 6, LAT, change * since - speed)
                 _put(room, i, 7, SLOW + i, 1.0)
                 _put(room, i, 8, FAST + i, 1.0)
+                _put(room, i, 9, VEL + i, -since)
             else:
-                y[i] = seen.value[m, i] - (speed - change * (back + late + value[LAG]))
+                y[i] = seen.value[m, i] - (speed - change * since)
+                _cross_row(room, i, 1, step[19] - since * fn, step[20] - since * fe, step[21] - since * fd)
                 _put(room, i, 0, VEL + i, 1.0)
-                _cross_row(room, i, 1, step[19], step[20], step[21], 1.0)
-                wx, wy, wz = step[25], step[26], step[27]
-                _put(room, i, 3, LEV, C[i, 1] * wz - C[i, 2] * wy)
-                _put(room, i, 4, LEV + 1, C[i, 2] * wx - C[i, 0] * wz)
-                _put(room, i, 5, LEV + 2, C[i, 0] * wy - C[i, 1] * wx)
+                _put(room, i, 3, LEV, lx)
+                _put(room, i, 4, LEV + 1, ly)
+                _put(room, i, 5, LEV + 2, lz)
                 _put(room, i, 6, LAT, -change)
                 _put(room, i, 7, LAG, -change)
         if kind == POSITION:
@@ -131,7 +144,7 @@ def observe(m: int, seen: Seen, now: Now, room: Room) -> None:
             east = SEMI_MAJOR_M / math.sqrt(root)
             north = east * (1.0 - ECCENTRICITY_SQUARED) / root
             y[0] += (seen.value[m, 0] - nav[0]) * (north + nav[2])
-            y[1] += (seen.value[m, 1] - nav[1]) * (east + nav[2]) * math.cos(nav[0])
+            y[1] += shorter_way(seen.value[m, 1] - nav[1]) * (east + nav[2]) * math.cos(nav[0])
             y[2] += nav[2] - seen.value[m, 2]
     elif kind == STILL:
         for i in range(3):
@@ -172,8 +185,7 @@ def observe(m: int, seen: Seen, now: Now, room: Room) -> None:
         _put(room, 0, 0, POS + 2, -1.0)
         _put(room, 0, 1, BARO, 1.0)
     elif kind == HEADING:
-        turn = (seen.value[m, 0] - math.atan2(C[1, 0], C[0, 0])) / (2.0 * math.pi)
-        y[0] = (turn - math.floor(turn + 0.5)) * 2.0 * math.pi
+        y[0] = shorter_way(seen.value[m, 0] - math.atan2(C[1, 0], C[0, 0]))
         level = C[0, 0] * C[0, 0] + C[1, 0] * C[1, 0]
         if level < 0.03:  # the nose points up or down: there is no heading
             y[0] = NO_ROW

@@ -191,8 +191,9 @@ def outages(results: FlightResults) -> Plot | None:
         ("smoothed, largest inside", data.smoothed_error_m, "answer", 1.0),
         ("95 % of the smoothed solution there", _radius_95(data.smoothed_sigma_m), "unused", 0.94),
     )
+    place = _side_by_side(data.length_s)
     marks: list[AnyMark] = [
-        Dots(x=aside * data.length_s, y=np.where(values > 0.0, values, np.nan), role=role, name=name, emphasis="bold")
+        Dots(x=aside * place, y=np.where(values > 0.0, values, np.nan), role=role, name=name, emphasis="bold")
         for name, values, role, aside in groups
         if has_values(values)
     ]
@@ -206,6 +207,15 @@ def outages(results: FlightResults) -> Plot | None:
         one_panel(Panel(marks, x, Axis("horizontal error, m", "log")), 58.0),
         ("trajectory_outages",),
     )
+
+
+def _side_by_side(length_s: Floats) -> Floats:
+    """Return the lengths, those of equal ones a little apart: dots above each other are told from one."""
+    place = np.array(length_s)
+    for one in np.unique(length_s):
+        of = np.flatnonzero(length_s == one)
+        place[of] = one * (1.0 + 0.045 * (np.arange(len(of)) / len(of) - 0.5))
+    return place
 
 
 def _radius_95(sigma: Floats) -> Floats:

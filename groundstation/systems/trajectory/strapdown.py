@@ -28,6 +28,13 @@ def normal_gravity(sine: float, height_m: float) -> float:
 
 
 @inlined
+def shorter_way(angle: float) -> float:
+    """Return an angle between two directions, or two longitudes, by the shorter way, rad."""
+    turns = angle / (2.0 * math.pi)
+    return (turns - math.floor(turns + 0.5)) * 2.0 * math.pi
+
+
+@inlined
 def rotation_of(nav: FloatArray, C: FloatArray) -> None:
     """Fill C from the quaternion of the estimate."""
     w, x, y, z = nav[6], nav[7], nav[8], nav[9]
@@ -204,42 +211,32 @@ def _push_column(grown: FloatArray, j: int, n: float, e: float, d: float, dt: fl
 
 
 @inlined
-def _push_square(
-    grown: FloatArray, j: int, C: FloatArray, one: int, first: float, other: int, second: float, dt: float
-) -> None:
-    """Let two axes of the accelerometer that are not square act: each reads a share of what the other feels."""
-    n = C[0, one] * first + C[0, other] * second
-    e = C[1, one] * first + C[1, other] * second
-    d = C[2, one] * first + C[2, other] * second
-    _push_column(grown, j, -n, -e, -d, dt)
-
-
-@inlined
 def grow_transition(C: FloatArray, step: FloatArray, grown: FloatArray) -> None:
     """Let the transition of navigation grow by one sample.
 
     Velocity errors turn with the frame over the epoch (``finish_transition``).
     """
     dt = step[15]
-    for i in range(3):  # biases, scale: the unit's axes
+    for i in range(3):  # the unit's axes: i reads, j turns
         x, y, z = C[0, i], C[1, i], C[2, i]
-        _grow_column(grown, BG + i, -x * dt, -y * dt, -z * dt, step)
-        a = step[i]
-        _grow_column(grown, SG + i, -x * a, -y * a, -z * a, step)
-        _push_column(grown, BA + i, -x * dt, -y * dt, -z * dt, dt)
-        a = step[16 + i]
-        _push_column(grown, SA + i, -x * a, -y * a, -z * a, dt)
-    a, b, c = step[0], step[1], step[2]
-    _grow_column(grown, MG, -C[0, 0] * b, -C[1, 0] * b, -C[2, 0] * b, step)
-    _grow_column(grown, MG + 1, -C[0, 0] * c, -C[1, 0] * c, -C[2, 0] * c, step)
-    _grow_column(grown, MG + 2, -C[0, 1] * a, -C[1, 1] * a, -C[2, 1] * a, step)
-    _grow_column(grown, MG + 3, -C[0, 1] * c, -C[1, 1] * c, -C[2, 1] * c, step)
-    _grow_column(grown, MG + 4, -C[0, 2] * a, -C[1, 2] * a, -C[2, 2] * a, step)
-    _grow_column(grown, MG + 5, -C[0, 2] * b, -C[1, 2] * b, -C[2, 2] * b, step)
-    a, b, c = step[16], step[17], step[18]
-    _push_square(grown, MA, C, 0, b, 1, a, dt)
-    _push_square(grown, MA + 1, C, 0, c, 2, a, dt)
-    _push_square(grown, MA + 2, C, 1, c, 2, b, dt)
+        for j in range(4):
+            turn, a = BG + i, dt
+            if j < 3:
+                a = step[j]
+                turn = SG + i if j == i else MG + 2 * i + j - (1 if j > i else 0)
+            _grow_column(grown, turn, -x * a, -y * a, -z * a, step)
+        for j in range(i, 4):
+            if j == 3:
+                _push_column(grown, BA + i, -x * dt, -y * dt, -z * dt, dt)
+            elif j == i:
+                a = step[16 + i]
+                _push_column(grown, SA + i, -x * a, -y * a, -z * a, dt)
+            else:  # each of two axes reads a share of what the other feels
+                a, b = step[16 + j], step[16 + i]
+                n = -x * a - C[0, j] * b
+                e = -y * a - C[1, j] * b
+                d = -z * a - C[2, j] * b
+                _push_column(grown, MA + i + j - 1, n, e, d, dt)
     # attitude: the specific force, once for velocity and twice for position
     for i in range(3):
         n, e, d = 0.0, 0.0, 0.0

@@ -4,7 +4,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from groundstation.base.angles import wrap_360
+from groundstation.base.angles import wrap_180, wrap_360
 from groundstation.base.geodesy import curvature_radii_m
 from groundstation.base.records import Int64Array
 from groundstation.systems.trajectory.model import DEG
@@ -71,7 +71,7 @@ def _states(
         samples.time_s[at],
         np.full(len(at), segment, dtype=np.int64),
         np.degrees(latitude),
-        np.degrees(longitude),
+        wrap_180(np.degrees(longitude)),
         nav[:, 2] - correction[:, 2],
         nav[:, 3:6] + correction[:, VEL:ATT],
         np.degrees(roll),

@@ -18,8 +18,8 @@ SHORT: tuple[tuple[Quantity, str], ...] = (
 def sentence_of(answer: BestTrajectory) -> str:
     """Return one sentence: the doubt, else the filter's error, else the accuracy."""
     if answer.state == "ambiguous":
-        first, second = (f"{one.start_heading_deg:.0f}" for one in answer.hypotheses[:2])
-        return f"two headings explain the log, {first} or {second} deg at the start: neither is claimed"
+        first, second = (f"{one.end_heading_deg:.0f}" for one in answer.hypotheses[:2])
+        return f"two headings explain the log, {first} or {second} deg at the end: neither is claimed"
     if answer.state == "doubtful":
         return f"sigmas may be too small: {answer.reasons[0]}"
     worst = opening_error(answer)

@@ -119,7 +119,7 @@ def ambiguous() -> BestTrajectory:
     shown = next(one for one in answer.figures if isinstance(one, TrajectoryTrack))
     other = track_figure(states, np.asarray(wrap_360(states.heading_deg + 155.0)))
     hypotheses = (HeadingHypothesis(40.0, 312.0, 0.0), HeadingHypothesis(195.0, 107.0, 3.2))
-    reason = "a heading of 195 deg at the start is only 3.2 log units below the best one of 40 deg, limit 10"
+    reason = "a heading of 107 deg at the end is only 3.2 log units below the best one of 312 deg, limit 10"
     figures = tuple(other if one is shown else one for one in answer.figures)
     return replace(answer, state="ambiguous", reasons=(reason,), hypotheses=hypotheses, figures=figures)
 

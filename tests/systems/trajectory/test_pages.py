@@ -102,7 +102,7 @@ def test_a_doubtful_solution_says_so_first_and_blames_nobody() -> None:
 
 def test_an_ambiguous_heading_shows_both_and_claims_neither() -> None:
     section = section_of(ambiguous())
-    assert section.headline.startswith("two headings explain the log, 40 or 195° at the start")
+    assert section.headline.startswith("two headings explain the log, 312 or 107° at the end")
     rows = grid(section, "Hypotheses").rows
     assert [row[1] for row in rows] == ["40.0°", "195.0°"] and rows[1][3] == "3.2"
     assert not any(row[0] == "Heading" for row in grid(section, "Accuracy").rows)

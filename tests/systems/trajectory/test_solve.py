@@ -43,7 +43,10 @@ def inputs(flight: ImuFlight) -> tuple[ImuIncrements, GnssFixes]:
 
 
 def errors_over_sigma(flight: ImuFlight, done: Estimate) -> dict[str, np.ndarray]:
-    """Errors of the smoothed states over their sigmas, once a second after a minute; a constant turn of the axes apart."""
+    """Errors of the smoothed states over their sigmas, once a second after a minute.
+
+    A constant turn of the axes is taken off.
+    """
     time_s = np.arange(60.0, flight.true_time_s[-1] - 1.0, 1.0)
     states = at_times(smoothed_track(done.problem.samples, done.result), time_s)
     at = np.searchsorted(flight.true_time_s, time_s)

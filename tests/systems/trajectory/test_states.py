@@ -12,7 +12,7 @@ from groundstation.results.arrays.states import BodyStates
 from groundstation.results.files import load, save
 from groundstation.results.manifest import Manifest
 from groundstation.results.roles import StatesAlongTheFlight
-from groundstation.systems.trajectory.answer import BestTrajectory
+from groundstation.systems.trajectory.answer import VELOCITY_LAG, BestTrajectory, TrajectoryParameter
 from groundstation.systems.trajectory.figures import offsets_m, states_of
 from tests.systems.trajectory.made import track
 from tests.systems.trajectory.made_answers import accepted, ambiguous, doubtful, results_of
@@ -73,3 +73,14 @@ def test_the_role_is_that_of_an_accepted_solution_alone() -> None:
     assert replace(found, figures=()).body_states() is None
     bare = replace(found, parameters=())
     assert bare.gnss_latency is None and bare.antenna_arm_m == (0.0, 0.0, 0.0)
+
+
+def test_velocity_of_gnss_behind_the_filter_is_what_both_are_behind_the_unit() -> None:
+    answer = accepted()
+    assert answer.onboard is not None and answer.onboard.delay_s is not None
+    found = answer.velocity_latency("ins")
+    assert found is not None and found[0] == pytest.approx(0.112 - answer.onboard.delay_s)
+    lag = TrajectoryParameter(VELOCITY_LAG, "latency", "s", 0.2, 0.003, 0.1, True)
+    later = replace(answer, parameters=(*answer.parameters, lag)).velocity_latency("ins")
+    assert later is not None and later[0] - found[0] == pytest.approx(0.2) and later[1] > found[1]
+    assert answer.velocity_latency("ins.2") is None and replace(answer, onboard=None).velocity_latency("ins") is None

@@ -1,0 +1,1 @@
+"""Study of the trajectory estimator: the families that are flown, their known noise, and the judgement."""
