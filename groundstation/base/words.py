@@ -1,6 +1,9 @@
-"""Words that pages, findings and sentences share: lists, counts, times of a clock."""
+"""Words that pages, findings and sentences share: lists, counts, times, intervals."""
 
+import math
 from collections.abc import Sequence
+
+NEAR_END_S = 15.0  # a span that ends so near the end of all of it lasts on
 
 
 def listed(names: Sequence[str]) -> str:
@@ -36,6 +39,50 @@ def clock_text(seconds: float) -> str:
     hours, rest = divmod(round(abs(seconds)), 3600)
     tail = f"{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"
     return f"{hours}:{tail}" if hours else tail
+
+
+def span_text(span_s: tuple[float, float], whole_s: tuple[float, float]) -> str:
+    """Return the time of a span within a whole one.
+
+    Examples
+    --------
+    >>> whole = (0.0, 900.0)
+    >>> span_text((100.0, 200.0), whole), span_text((723.0, 890.0), whole), span_text((3.0, 899.0), whole)
+    ('1:40 to 3:20', 'from 12:03 on', 'throughout')
+    """
+    from_start, to_end = span_s[0] - whole_s[0] < NEAR_END_S, whole_s[1] - span_s[1] < NEAR_END_S
+    if from_start and to_end:
+        return "throughout"
+    if to_end:
+        return f"from {clock_text(span_s[0])} on"
+    return f"{clock_text(span_s[0])} to {clock_text(span_s[1])}"
+
+
+def with_half(value: float, half: float, unit: str) -> str:
+    """Return a value with half of its interval, rounded by the latter.
+
+    Examples
+    --------
+    >>> with_half(2.134, 0.31, "deg"), with_half(-18.27, 1.23, "m"), with_half(151.2, 32.0, "m")
+    ('2.1 +- 0.3 deg', '-18.3 +- 1.2 m', '151 +- 32 m')
+    """
+    places = places_of(half)
+    return f"{round(value, places) + 0.0:.{places}f} +- {half:.{places}f} {unit}".strip()
+
+
+def places_of(half: float) -> int:
+    """Return the decimals with one digit, two where it begins with a one.
+
+    Examples
+    --------
+    >>> places_of(0.31), places_of(0.123), places_of(32.0), places_of(0.0)
+    (1, 2, 0, 1)
+    """
+    if not half > 0.0 or not math.isfinite(half):
+        return 1
+    exponent = math.floor(math.log10(half))
+    leading = round(half / 10.0**exponent, 1)
+    return min(max(-exponent + (1 if leading < 2.0 else 0), 0), 6)
 
 
 def never_a_fix(rows: int, satellites: float | None) -> str:

@@ -310,6 +310,69 @@ class StatesAlongTheFlight:
         return None if states is None else states.at_point(*self.antenna_arm_m)
 
 
+@dataclass(frozen=True)
+class FilterWrong:
+    """Span in which an on-board filter was surely wrong.
+
+    Parameters
+    ----------
+    span_s, whole_s : (float, float)
+        Flight seconds of it, and of all that was judged.
+    value, half95 : float
+        Median error in it, and half of its 95 % interval.
+    over : float
+        What is sure of it, over the error that a report opens with.
+    """
+
+    span_s: tuple[float, float]
+    whole_s: tuple[float, float]
+    value: float
+    half95: float
+    over: float
+
+
+@dataclass(frozen=True)
+class FilterError:
+    """Error of an on-board filter in one quantity; what is constant all through the log is not in it.
+
+    Parameters
+    ----------
+    quantity, unit : str
+        "heading", "horizontal position" ...
+    rms, sigma_rms : float
+        Of the error, and of what judges it.
+    wrong : tuple of FilterWrong
+        The worst first.
+    constant : str
+        Words on the constant and its cause; empty where there is none.
+    """
+
+    quantity: str
+    unit: str
+    rms: float
+    sigma_rms: float
+    wrong: tuple[FilterWrong, ...] = ()
+    constant: str = ""
+
+
+class ErrorsOfFilter:
+    """Role of an answer with the errors of an on-board filter, judged by states that do not come from it."""
+
+    @property
+    def filter_topic(self) -> str:
+        """Topic of the filter whose errors are known; empty where none are, or the checks do not hold."""
+        raise NotImplementedError
+
+    @property
+    def by_it(self) -> str:
+        """Words for what is found by it: "by the best trajectory (heading to 0.3 deg)"."""
+        raise NotImplementedError
+
+    def filter_errors(self) -> tuple[FilterError, ...]:
+        """Return the errors of that filter by quantity."""
+        raise NotImplementedError
+
+
 class WordsOfRecord:
     """Role of an answer with words on a kind of signals for the line on the recording.
 

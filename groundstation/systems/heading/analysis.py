@@ -3,12 +3,13 @@
 It uses the user's intervals and the proof of ground contact.
 """
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from groundstation.base.findings import Finding
 from groundstation.methods.roles import HeadingOnGround, LimitsOfTaxi
 from groundstation.results.answer import Answers, answer_of
-from groundstation.results.roles import Delays
+from groundstation.results.roles import Delays, StatesAlongTheFlight
 from groundstation.results.rules import Rejudged
 from groundstation.systems.analysis import Analysis, Found, RejudgeAlso, RestsOn, Rules, Shortfall, main_numbers
 from groundstation.systems.heading.answer import HeadingResult
@@ -30,6 +31,7 @@ FIELDS = (
 
 def _run(flight: "Flight", known: Known, settings: HeadingSettings) -> Found[HeadingResult]:
     from groundstation.systems.heading.estimate import estimate_heading_error
+    from groundstation.systems.heading.second import by_states, disagreement
     from groundstation.tables.headings import true_heading
     from groundstation.tables.phases import ground_mask
 
@@ -47,7 +49,10 @@ def _run(flight: "Flight", known: Known, settings: HeadingSettings) -> Found[Hea
         phases=known.phases,
         weather=known.weather,
     )
-    return Found(found, (_verdict(found), *_steps(found), *_findings_of_what_was_set(flight, found, known)))
+    second = by_states(found, known.answer_meeting(StatesAlongTheFlight), settings, known.aircraft)
+    found = found if second is None else replace(found, by_states=second)
+    told = (_verdict(found), *_steps(found), *_findings_of_what_was_set(flight, found, known), *disagreement(found))
+    return Found(found, told)
 
 
 def _examine(flight: "Flight", known: Known, settings: HeadingSettings) -> tuple[Shortfall, ...]:
@@ -142,7 +147,7 @@ HEADING = Analysis(
     settings=HeadingSettings,
     answer=HeadingResult,
     run=_run,
-    builds_on=("latency",),
+    builds_on=("latency", "trajectory"),
     rests_on=_rests_on,
     sentence=_sentence,
     columns=COLUMNS,

@@ -123,6 +123,41 @@ class RunwayCheck:
 
 
 @dataclass(frozen=True)
+class HeadingByStates:
+    """Heading error by the heading of states of their own, on the same straights: a second interval.
+
+    Both rest on the INS heading and on the velocity of GNSS and are never combined.
+
+    Parameters
+    ----------
+    by : str
+        "by the best trajectory (heading to 0.3 deg)".
+    error_deg, sigma_deg : float
+        INS heading minus theirs; the sigma has theirs, the mounting's and the scatter.
+    confidence95_deg : (float, float)
+    samples : int
+        Epochs of the taxi with states beside them.
+    correlation : float or None
+        Of the two differences over these epochs; None where one does not vary.
+    difference_deg : float
+        Taxi minus this.
+    agrees : bool
+        Whether both intervals meet.
+    """
+
+    schema_name: ClassVar[str] = "by_states"
+
+    by: str
+    error_deg: float
+    sigma_deg: float
+    confidence95_deg: tuple[float, float]
+    samples: int
+    correlation: float | None
+    difference_deg: float
+    agrees: bool
+
+
+@dataclass(frozen=True)
 class OnboardComparison:
     """Figures of the aircraft itself (topic ``onboard``) beside ours.
 
@@ -197,6 +232,8 @@ class HeadingResult(Answer, OnTaxi, HeadingByTrack, LatencyByTurns):
         correction would find.
     reference_time_s : float
         Flight time the error belongs to (weighted mean time of the samples).
+    by_states : HeadingByStates or None
+        A second interval, by the heading of the best trajectory where its checks hold.
     """
 
     analysis: ClassVar[str] = "heading"
@@ -257,6 +294,7 @@ class HeadingResult(Answer, OnTaxi, HeadingByTrack, LatencyByTurns):
     wander_s: float | None = None
     steps: tuple[HeadingStep, ...] = ()
     reference_time_s: float | None = None
+    by_states: HeadingByStates | None = None
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
 

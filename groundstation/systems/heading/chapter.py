@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from groundstation.chapters.agreement import agreement_note
 from groundstation.chapters.gates import NOT_ASSESSABLE, gate_grid, setting_facts
 from groundstation.chapters.parts import Facts, Figure, Grid, Head, Note, Part, Section, kept
-from groundstation.chapters.wording import ABSENT, clock, interval, is_number, number, step_places
+from groundstation.chapters.wording import ABSENT, clock, interval, is_number, number, step_places, typeset
 from groundstation.results.chosen import ChosenInterval
 from groundstation.results.flight import FlightResults
 from groundstation.systems.heading.advice_chapter import explained
@@ -61,6 +61,7 @@ def heading(results: FlightResults) -> Section:
     told, segments = claim(answer), _segments(answer.segments)
     parts = (
         agreement_note(heading_agreement(results.answers)),
+        _second(answer),
         gate_grid(answer.gates),
         Figure("heading.difference"),
         Figure("heading.taxi"),
@@ -82,6 +83,32 @@ def heading(results: FlightResults) -> Section:
     )
     above: tuple[Part, ...] = (*(Note(sentence) for sentence in told.sentences), Facts("", told.figures))
     return Section("heading", TITLE, LEAD, kept(parts), told.line, above, told, kept(workings))
+
+
+def _second(answer: HeadingResult) -> Note | None:
+    """Return the second interval, by states of their own, beside that of the taxi."""
+    second = answer.by_states
+    if second is None:
+        return None
+    taxi, other = (
+        f"{number(error, 3, '°', signed=True)} (95 % {interval(ends, 3, '°')})"
+        for error, ends in (
+            (answer.error_deg, answer.confidence95_deg),
+            (second.error_deg, second.confidence95_deg),
+        )
+    )
+    meet = "Their intervals meet" if second.agrees else "Their intervals do not meet: one errs by more than it says"
+    at_once = (
+        ""
+        if second.correlation is None
+        else f" (correlation of their differences {number(second.correlation, 2, signed=True)})"
+    )
+    text = (
+        f"Heading error by taxi {taxi}; {second.by} on the same straights {other}, {second.samples} epochs. {meet}. "
+        f"Both rest on the INS heading and on GNSS velocity{at_once}, so they are not combined; agreement is weaker "
+        "evidence than that of independent numbers."
+    )
+    return Note(typeset(text), "good" if second.agrees else "warn")
 
 
 def _segments(segments: Sequence[TaxiSegment]) -> Grid | None:

@@ -12,10 +12,12 @@ import numpy as np
 from groundstation.base.findings import Finding
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.signals import topics_of_kind
+from groundstation.results.answer import Answers
 from groundstation.systems.inertial.answer import CHANNELS, Difference, InertialResult, OwnInnovation
 from groundstation.systems.inertial.departures import departures, filter_of_ins, findings_of
 from groundstation.systems.inertial.differences import InsDifferences, differences
 from groundstation.systems.inertial.figures import differences_figure, own_innovations_figure, plain_track_figure
+from groundstation.systems.inertial.judged_answer import judged_filter
 from groundstation.systems.inertial.kind import LEAST_AIDED_S, WHY_NOT
 from groundstation.systems.inertial.model import FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
@@ -35,6 +37,7 @@ def compare_aided(
     *,
     settings: InertialSettings,
     excluded_s: tuple[tuple[float, float], ...] = (),
+    answers: Answers | None = None,
 ) -> tuple[InertialResult, tuple[Finding, ...]]:
     """Describe INS minus GNSS of an aided INS, and the innovations its own filter logged.
 
@@ -49,6 +52,8 @@ def compare_aided(
     settings : InertialSettings
     excluded_s : tuple of (float, float)
         Flight seconds in which GNSS is not used.
+    answers : mapping, optional
+        Answers before this one: one may know the errors of the INS.
 
     Returns
     -------
@@ -78,7 +83,9 @@ def compare_aided(
         figures=figures if own is None else (*figures, own_innovations_figure(flight, own)),
     )
     code, says = CODES[kind[0]], WHY_NOT[kind[0]]
-    text = f"{says} ({kind[1]}): INS minus GNSS is shown, errors and forecast are not estimated"
+    judged = judged_filter(answers or {}, compared.ins_topic)
+    left_out = "errors and forecast are not estimated" if judged is None else judged.sentence
+    text = f"{says} ({kind[1]}): INS minus GNSS is shown, {left_out}"
     position = result.difference("position")
     left = findings_of(
         result.departures, result.filter_of_ins, None if position is None else position.median, compared.ins_topic

@@ -1,11 +1,13 @@
 """Chapter on an INS that GNSS corrects, or may correct.
 
-INS - GNSS, and the innovations that its own filter logged.
+INS - GNSS, the innovations that its own filter logged, and its errors where an answer with its own states knows them.
 """
 
 from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, kept
-from groundstation.chapters.wording import ABSENT, any_value, clock, number, percent, typeset, unit_sign
+from groundstation.chapters.wording import ABSENT, any_value, clock, number, percent, significant, typeset, unit_sign
+from groundstation.results.answer import Answers
 from groundstation.systems.inertial.answer import Departure, Difference, InertialResult, OwnInnovation
+from groundstation.systems.inertial.judged_answer import JudgedFilter, judged_filter
 
 TITLE = "INS against GNSS"
 HEADLINES = {"gnss_aided": "GNSS corrects this INS", "unknown": "It is not known whether GNSS corrects this INS"}
@@ -13,14 +15,16 @@ LEAD = "INS − GNSS shows how closely this INS follows its receiver, not how go
 PLACES = {"m": 2, "mps": 3}
 
 
-def aided(answer: InertialResult) -> Section:
+def aided(answer: InertialResult, answers: Answers) -> Section:
     """Return the chapter of an INS that GNSS corrects, or may correct."""
+    judged = judged_filter(answers, answer.ins_topic)
     position = answer.difference("position")
     is_known = answer.kind == "gnss_aided"
     within = f": within {number(position.p95, 1, 'm')} of it (95 %)" if position is not None and is_known else ""
     parts: tuple[Part | None, ...] = (
         _departures(answer),
-        _why(answer),
+        _errors(judged),
+        _why(answer, is_judged=judged is not None),
         _differences(answer.differences),
         Figure("inertial.differences", of="position"),
         Figure("inertial.differences", of="velocity"),
@@ -29,12 +33,13 @@ def aided(answer: InertialResult) -> Section:
     )
     left = answer.worst_departure
     headline = f"{HEADLINES[answer.kind]}{within}" if left is None else _left(answer, left)
-    return Section(
-        "inertial", TITLE, LEAD, kept(parts), headline, claim=_claim(answer, headline), appendix=(_pair(answer),)
-    )
+    if judged is not None:
+        headline = f"{headline}; {typeset(judged.sentence)}"
+    claim = _claim(answer, headline, judged)
+    return Section("inertial", TITLE, LEAD, kept(parts), headline, claim=claim, appendix=(_pair(answer),))
 
 
-def _claim(answer: InertialResult, headline: str) -> Claim:
+def _claim(answer: InertialResult, headline: str, judged: JudgedFilter | None) -> Claim:
     rows = [row for row in (answer.difference("position"), answer.difference("velocity")) if row is not None]
     figures = tuple(
         (f"INS − GNSS, {row.quantity}", number(row.p95, PLACES.get(row.unit, 3) - 1, unit_sign(row.unit)), "95 %")
@@ -43,10 +48,15 @@ def _claim(answer: InertialResult, headline: str) -> Claim:
     reason = typeset(answer.kind_reason).strip().rstrip(".")
     sentences = (f"{reason[:1].upper()}{reason[1:]}.",) if reason else ()
     value = figures[0][1] if figures else ""
-    remark = "INS − GNSS, 95 %; its own drift cannot be seen" if figures else "its own drift cannot be seen"
+    unseen = "its own drift cannot be seen" if judged is None else f"its errors stand {judged.by}"
+    remark = f"INS − GNSS, 95 %; {unseen}" if figures else unseen
     left = answer.worst_departure
     if left is not None:
         return _claim_on(answer, left, headline)
+    if judged is not None:
+        word = "Judged" if judged.worst is None else "Wrong"
+        mark = Mark("good" if judged.worst is None else "warn", word)
+        return Claim(Rank.INERTIAL_OPEN, mark, headline, value, remark, sentences, (*figures, *_sizes_told(judged)))
     word = "Aided" if answer.kind == "gnss_aided" else "Open"
     return Claim(Rank.INERTIAL_OPEN, Mark("unknown", word), headline, value, remark, sentences, figures)
 
@@ -105,9 +115,34 @@ def _departures(answer: InertialResult) -> Grid | None:
     return Grid("Departures from GNSS", heads, rows, caption)
 
 
-def _why(answer: InertialResult) -> Note:
+def _sizes_told(judged: JudgedFilter) -> tuple[tuple[str, str, str], ...]:
+    """Return its errors as figures: root mean square, and the sigma of what judges them."""
+    return tuple(
+        (
+            f"Error, {row.quantity}",
+            f"{significant(row.rms, 2)} {unit_sign(row.unit)}",
+            f"RMS; σ {significant(row.sigma_rms, 2)}",
+        )
+        for row in judged.rows
+        if row.quantity in ("heading", "horizontal position")
+    )
+
+
+def _errors(judged: JudgedFilter | None) -> Note | None:
+    """Return its errors in a sentence; the chapter of what judges it has them along the flight."""
+    if judged is None:
+        return None
+    constant = f" Constant, and no error of the filter: {'; '.join(judged.constants)}." if judged.constants else ""
+    wrong = f"Worst: {judged.wrong}. " if judged.worst else ""
+    text = f"{wrong}Errors of the INS {judged.by}: {judged.errors}.{constant} That chapter has them along the flight."
+    return Note(typeset(text), "good" if judged.worst is None else "warn")
+
+
+def _why(answer: InertialResult, *, is_judged: bool) -> Note:
     reason = typeset(answer.kind_reason).strip().rstrip(".")
     unseen = "Errors that GNSS removes cannot be seen against GNSS, so nothing is estimated, corrected or forecast."
+    if is_judged:
+        unseen = "Errors that GNSS removes cannot be seen against GNSS: from these differences nothing is estimated."
     if answer.kind == "gnss_aided":
         return Note(f"GNSS corrects this INS already: {reason}. {unseen}")
     text = f"{HEADLINES[answer.kind]}: {reason}. {unseen} To decide it, state ins_kind in the aircraft file."

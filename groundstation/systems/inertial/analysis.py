@@ -13,6 +13,7 @@ from groundstation.systems.analysis import Analysis, Found, RestsOn, Shortfall, 
 from groundstation.systems.inertial.answer import InertialResult
 from groundstation.systems.inertial.columns import FORECAST_COLUMNS, INERTIAL_COLUMNS
 from groundstation.systems.inertial.forecast_answer import ForecastResult
+from groundstation.systems.inertial.judged_answer import judged_filter
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.known import AircraftData, Known
 from groundstation.tables.phases import Phases
@@ -40,7 +41,9 @@ def _run(flight: "Flight", known: Known, settings: InertialSettings) -> Found[In
 
     compared, kind = compared_with_kind(flight, known, settings)
     if kind[0] != UNAIDED:
-        return Found(*compare_aided(flight, kind, settings=settings, excluded_s=known.excluded_s))
+        return Found(
+            *compare_aided(flight, kind, settings=settings, excluded_s=known.excluded_s, answers=known.answers)
+        )
     aircraft = known.aircraft
     found = estimate_compared(
         flight,
@@ -76,7 +79,9 @@ def _run_forecast(_flight: "Flight", known: Known, settings: InertialSettings) -
         inertial = known.answer(InertialResult)
         says = WHY_NOT[AIDED if inertial is None else inertial.kind]
         why = f" ({inertial.kind_reason})" if inertial is not None else ""
-        raise NotAssessableError("forecast", f"{says}{why}: its errors are not estimated")
+        judged = None if inertial is None else judged_filter(known.answers, inertial.ins_topic)
+        left = "its errors are not estimated" if judged is None else f"its errors are known {judged.by}, none grows"
+        raise NotAssessableError("forecast", f"{says}{why}: {left}")
     phases = known.phases
     return Found(assess_forecast(estimation, settings=settings, phase_of=phases.at, take_off_s=take_off_s(phases)))
 
@@ -109,10 +114,11 @@ def _sentence(answers: Answers) -> str:
         says = "INS corrected by GNSS" if inertial.kind == "gnss_aided" else "INS perhaps corrected by GNSS"
         within = "" if position is None else f", within {position.p95:.1f} m of it (95 %)"
         left = inertial.worst_departure
+        judged = judged_filter(answers, inertial.ins_topic)
         if left is not None:
-            of = inertial.filter_of_ins
-            return f"{of.title} and GNSS {left.apart}apart for {left.end_s - left.start_s:.0f} s{of.use}"
-        return f"{says}{within}: no errors, no forecast"
+            of, told = inertial.filter_of_ins, "" if judged is None else f"; {judged.sentence}"
+            return f"{of.title} and GNSS {left.apart}apart for {left.end_s - left.start_s:.0f} s{of.use}{told}"
+        return f"{says}{within}{': no errors, no forecast' if judged is None else f'; {judged.sentence}'}"
     parts = []
     if inertial.radial_error_rate_fit_nmiph is not None:
         parts.append(f"{inertial.radial_error_rate_fit_nmiph:.2f} nmi/h")
@@ -142,6 +148,7 @@ INERTIAL = Analysis(
     settings=InertialSettings,
     answer=InertialResult,
     run=_run,
+    builds_on=("trajectory",),
     rests_on=_rests_on,
     sentence=_sentence,
     check=_check,

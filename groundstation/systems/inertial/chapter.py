@@ -46,7 +46,7 @@ def inertial(results: FlightResults) -> Section | None:
     if answer is None:
         return without_answer(results, "inertial", TITLE, LEAD)
     if answer.kind != "unaided":
-        return aided(answer)
+        return aided(answer, results.answers)
     parts: tuple[Part | None, ...] = (
         *_conclusions(answer),
         Figure("inertial.state", of="position"),

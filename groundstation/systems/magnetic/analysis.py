@@ -6,7 +6,7 @@ from groundstation.base.findings import Finding
 from groundstation.base.signals import topics_of_kind
 from groundstation.methods.roles import HeadingOnGround
 from groundstation.results.answer import Answers, answer_of
-from groundstation.results.roles import AzimuthByTurns, Delays, HeadingByTrack, KindOfIns
+from groundstation.results.roles import AzimuthByTurns, Delays, HeadingByTrack, KindOfIns, StatesAlongTheFlight
 from groundstation.results.rules import Rejudged
 from groundstation.systems.analysis import Analysis, Found, Rules, Shortfall, main_numbers
 from groundstation.systems.known import Known
@@ -34,6 +34,7 @@ def _run(flight: "Flight", known: Known, settings: MagneticSettings) -> Found[Ma
         by_turns=known.answer_meeting(AzimuthByTurns),
         latencies=known.answer_meeting(Delays),
         kinds=known_ins.kinds if known_ins else {},
+        states=known.answer_meeting(StatesAlongTheFlight),
         aircraft=known.aircraft,
         phases=known.phases,
     )
@@ -131,7 +132,7 @@ MAGNETIC = Analysis(
     settings=MagneticSettings,
     answer=MagneticResult,
     run=_run,
-    builds_on=("heading", "inertial", "latency"),
+    builds_on=("heading", "inertial", "latency", "trajectory"),
     is_expected=_has_readings,
     sentence=_sentence,
     columns=COLUMNS,

@@ -17,7 +17,7 @@ NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not o
 MagneticVerdict = Literal["accept", "reject", "undecided"]
 MethodName = Literal["compass_table", "poisson_attitude", "constant_modulus"]
 ConditionName = Literal["pitch", "ground", "gain"]
-SourceName = Literal["taxi", "ground run", "turns"]
+SourceName = Literal["taxi", "ground run", "turns", "states"]
 MethodState = Literal["fitted", "refused"]
 TurnState = Literal["used", "rejected"]
 Vector = tuple[float, float, float]
@@ -42,7 +42,8 @@ class AlignmentSource:
     """One way in which the flight shows the INS heading error, at the time of the figure.
 
     ``taxi``: the heading analysis; ``ground run``: the run to lift-off; ``turns``: azimuth by turns in flight, the
-    sigma of the mounting included. It is None where there is no number. ``at_s``: flight seconds at which it was seen.
+    sigma of the mounting included; ``states``: attitude and heading of the best trajectory in place of the INS, where
+    there is one. It is None where there is no number. ``at_s``: flight seconds at which it was seen.
     ``reason``: why it is not used.
     """
 

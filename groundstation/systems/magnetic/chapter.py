@@ -312,9 +312,18 @@ def _basis(answer: MagneticResult) -> Facts:
             f"{number(coverage.widest_gap_deg, 0, '°')}",
         ),
         ("Forecast bank bias of the table", bias or ABSENT, "average of opposite banks minus level flight, RMS"),
-        ("Sensors", f"{answer.magnetometer_topic} against {answer.ins_topic}", ""),
+        ("Sensors", f"{answer.magnetometer_topic} against {answer.ins_topic}", _attitude_of(alignment)),
     )
     return Facts("Basis", pairs)
+
+
+def _attitude_of(alignment: Alignment) -> str:
+    """Return which reference gave attitude and heading, where there was a choice."""
+    states = alignment.source("states")
+    if states is None:
+        return ""
+    known = f"best trajectory, heading σ {number(states.sigma_deg, 2, '°')}"
+    return f"attitude and heading by the {known}" if states.is_used else f"{known}: {states.reason}"
 
 
 def _gyros(alignment: Alignment) -> tuple[tuple[str, str, str], ...]:

@@ -1,17 +1,20 @@
 """Magnetic estimator: from the tables of a flight to a deviation, a verdict and a card."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
+from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import BoolArray
 from groundstation.base.units import S_PER_H
 from groundstation.methods.roles import HeadingOnGround
-from groundstation.results.roles import AzimuthByTurns, Delays, HeadingByTrack
+from groundstation.results.arrays.states import BodyStates
+from groundstation.results.roles import AzimuthByTurns, Delays, HeadingByTrack, StatesAlongTheFlight
 from groundstation.systems.known import AircraftData
 from groundstation.systems.magnetic.alignment import align, refused
 from groundstation.systems.magnetic.answer import (
@@ -26,10 +29,11 @@ from groundstation.systems.magnetic.answer import (
 )
 from groundstation.systems.magnetic.apply import corrected_by_table
 from groundstation.systems.magnetic.before_lift_off import find_ground_runs, gyros_at_standstill
+from groundstation.systems.magnetic.by_states import StatesReference, aligned_by_states, not_taken, reference_of
 from groundstation.systems.magnetic.compass_table import CompassTable, build_table
 from groundstation.systems.magnetic.earth import earth_field
 from groundstation.systems.magnetic.figures import draw, parts_of
-from groundstation.systems.magnetic.flown import find_flown
+from groundstation.systems.magnetic.flown import FlownTurns, find_flown
 from groundstation.systems.magnetic.held_out import Unseen, advantage, hold_out, is_level
 from groundstation.systems.magnetic.iron import bank_bias, curve_rms, heading_errors, parameters_of
 from groundstation.systems.magnetic.manoeuvre import FoundTurn, OppositeTurns, widest_gap_deg
@@ -63,6 +67,7 @@ def estimate_deviation(
     kinds: Mapping[str, str] | None = None,
     aircraft: AircraftData | None = None,
     phases: Phases | None = None,
+    states: StatesAlongTheFlight | None = None,
     ins_topic: str = "",
     magnetometer_topic: str = "",
 ) -> MagneticResult:
@@ -87,6 +92,9 @@ def estimate_deviation(
         Its mounting angle is taken off the INS heading, apart from the alignment.
     phases : Phases, optional
         Default: found here.
+    states : StatesAlongTheFlight, optional
+        Where their checks hold, their attitude and heading stand in place of those of an INS that is no independent
+        reference, or whose aligned heading is less sure.
     ins_topic, magnetometer_topic : str
         Default: the first that have what is needed.
 
@@ -106,18 +114,84 @@ def estimate_deviation(
     settings = settings or MagneticSettings()
     topics = choose_topics(flight, ins_topic, magnetometer_topic)
     phases = phases or flight_phases(flight)
-    flown = find_flown(flight, topics, phases, kinds or {}, latencies, settings)
-    readings, is_airborne, figures, turns = flown.readings, flown.is_airborne, flown.figures, flown.turns
-    figure_at_s = float(np.mean([0.5 * (figure.start_s + figure.end_s) for figure in figures]))
-    aircraft = aircraft or AircraftData()
-    runs = find_ground_runs(
-        flight, topics[0], heading, phases, on_ground, settings, is_enough=lambda one: not refused(one)
+    given = _Given(flight, topics, phases, kinds or {}, latencies, settings, aircraft or AircraftData())
+    flown, alignment = _referred(
+        given, reference_of(states, settings), lambda found: _by_ins(given, found, heading, on_ground, by_turns)
     )
-    gyros = gyros_at_standstill(flight, topics[0], phases, settings)
-    alignment = align(heading, topics[0], figure_at_s, settings, runs, gyros, by_turns=by_turns, aircraft=aircraft)
-    readings = _aligned(readings, alignment, aircraft.mounting_deg)
-    result = _answer(flight, topics, readings, is_airborne, (figures, turns), alignment, settings)
+    by = alignment.source("states")
+    mounting_deg = 0.0 if by is not None and by.is_used else given.aircraft.mounting_deg
+    readings = _aligned(flown.readings, alignment, mounting_deg)
+    result = _answer(flight, topics, readings, flown.is_airborne, (flown.figures, flown.turns), alignment, settings)
     return replace(result, remarks=remarks_on(flight, result, flown.latency_s, kinds or {}, settings))
+
+
+class _Given(NamedTuple):
+    """Flight and what is known of it."""
+
+    flight: Flight
+    topics: tuple[str, str]
+    phases: Phases
+    kinds: Mapping[str, str]
+    latencies: Delays | None
+    settings: MagneticSettings
+    aircraft: AircraftData
+
+    def flown(self, states: BodyStates | None = None) -> FlownTurns:
+        """Find the turns, with the attitude of the INS or of states."""
+        return find_flown(self.flight, self.topics, self.phases, self.kinds, self.latencies, self.settings, states)
+
+
+def _referred(
+    given: _Given, reference: StatesReference | None, by_ins: Callable[[FlownTurns], Alignment]
+) -> tuple[FlownTurns, Alignment]:
+    """Return the turns by the surer reference, INS or states, and what aligns it."""
+    try:
+        flown = given.flown()
+        alignment = by_ins(flown)
+    except NotAssessableError:
+        if reference is None:
+            raise
+        return _by_states(given, reference)
+    if reference is None:
+        return flown, alignment
+    try:
+        other, by_states = _by_states(given, reference)
+    except NotAssessableError:
+        return flown, alignment
+    if by_states.sigma_deg < alignment.sigma_deg:
+        return other, by_states
+    source = not_taken(by_states.sigma_deg, by_states.figure_at_s)
+    return flown, replace(alignment, sources=(*alignment.sources, source))
+
+
+def _by_states(given: _Given, reference: StatesReference) -> tuple[FlownTurns, Alignment]:
+    flown = given.flown(reference.states)
+    rows = np.concatenate([figure.rows(right) for figure in flown.figures for right in (True, False)])
+    times_s = flown.readings.time_s[rows]
+    return flown, aligned_by_states(
+        reference, given.topics[0], times_s, _figure_at_s(flown), given.settings, given.aircraft
+    )
+
+
+def _by_ins(
+    given: _Given,
+    flown: FlownTurns,
+    heading: HeadingByTrack | None,
+    on_ground: HeadingOnGround | None,
+    by_turns: AzimuthByTurns | None,
+) -> Alignment:
+    flight, ins_topic, settings = given.flight, given.topics[0], given.settings
+    runs = find_ground_runs(
+        flight, ins_topic, heading, given.phases, on_ground, settings, is_enough=lambda one: not refused(one)
+    )
+    gyros = gyros_at_standstill(flight, ins_topic, given.phases, settings)
+    return align(
+        heading, ins_topic, _figure_at_s(flown), settings, runs, gyros, by_turns=by_turns, aircraft=given.aircraft
+    )
+
+
+def _figure_at_s(flown: FlownTurns) -> float:
+    return float(np.mean([0.5 * (figure.start_s + figure.end_s) for figure in flown.figures]))
 
 
 def _answer(

@@ -10,6 +10,7 @@ import numpy as np
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import BoolArray
+from groundstation.results.arrays.states import BodyStates
 from groundstation.results.roles import Delays
 from groundstation.systems.magnetic.manoeuvre import FoundTurn, OppositeTurns, find_figures, find_turns
 from groundstation.systems.magnetic.readings import ANALYSIS, Readings, gather, why_not_independent
@@ -38,18 +39,21 @@ def find_flown(
     kinds: Mapping[str, str],
     latencies: Delays | None,
     settings: MagneticSettings,
+    states: BodyStates | None = None,
 ) -> FlownTurns:
     """Find the opposite turns of a flight; parameters as of ``estimate_deviation``.
+
+    ``states`` give attitude and heading in place of the INS.
 
     Raises
     ------
     NotAssessableError
         With the reason: no independent heading, hardly a reading, no figure.
     """
-    objection = why_not_independent(flight, topics[0], dict(kinds), settings)
+    objection = "" if states is not None else why_not_independent(flight, topics[0], dict(kinds), settings)
     if objection:
         raise NotAssessableError(ANALYSIS, objection)
-    readings, latency_s = gather(flight, topics, latencies, settings)
+    readings, latency_s = gather(flight, topics, latencies, settings, states)
     is_airborne = np.isin(phases.at(readings.time_s), IN_THE_AIR)
     figures, turns = find_figures(readings, find_turns(readings, is_airborne, settings), settings)
     if not figures:

@@ -10,6 +10,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
+from groundstation.results.arrays.states import BodyStates
 from groundstation.results.roles import Delays
 from groundstation.systems.magnetic.attitude import levelled_heading_deg
 from groundstation.systems.magnetic.settings import MagneticSettings
@@ -99,11 +100,16 @@ def why_not_independent(flight: Flight, ins_topic: str, kinds: dict[str, str], s
 
 
 def gather(
-    flight: Flight, topics: tuple[str, str], latencies: Delays | None, settings: MagneticSettings
+    flight: Flight,
+    topics: tuple[str, str],
+    latencies: Delays | None,
+    settings: MagneticSettings,
+    states: BodyStates | None = None,
 ) -> tuple[Readings, float]:
     """Return readings at the times of the magnetometer, and its latency.
 
-    The times are put back by the latency where that is observed.
+    The times are put back by the latency where that is observed. Attitude and heading are those of ``states`` where
+    they are given, else those of the INS.
 
     Raises
     ------
@@ -115,25 +121,35 @@ def gather(
     unit = unit.trusted()
     latency_s = latency_of(topics, latencies)
     at_ns = sensor.time_ns - round(latency_s * NS_PER_S)
-    attitude = join(unit, at_ns, ATTITUDE, largest_gap_s=settings.gap_max_s)
+    attitude = _attitude(flight, unit, at_ns, settings, states)
     latitude, longitude = position_at(flight, unit, at_ns)
     readings = Readings(
         flight.seconds(at_ns),
         np.stack([sensor.values(name) for name in FIELD], axis=-1),
-        attitude.values("roll_deg"),
-        attitude.values("pitch_deg"),
-        wrap_360(attitude.values("true_heading_deg")),
+        attitude[0],
+        attitude[1],
+        wrap_360(attitude[2]),
         altitude_at(flight, unit, at_ns),
         latitude,
         longitude,
         current_at(flight, at_ns),
     )
-    known = attitude.valid(*ATTITUDE) & (np.abs(readings.field_nt).sum(axis=1) > 0.0)
+    known = np.isfinite(attitude).all(axis=0) & (np.abs(readings.field_nt).sum(axis=1) > 0.0)
     if np.count_nonzero(known) < LEAST_READINGS:
-        raise NotAssessableError(
-            ANALYSIS, f"too few readings of {topics[1]} while the attitude of {topics[0]} is known"
-        )
+        whose = topics[0] if states is None else "the best trajectory"
+        raise NotAssessableError(ANALYSIS, f"too few readings of {topics[1]} while the attitude of {whose} is known")
     return readings.take(known), latency_s
+
+
+def _attitude(
+    flight: Flight, unit: Table, at_ns: Int64Array, settings: MagneticSettings, states: BodyStates | None
+) -> FloatArray:
+    """Return roll, pitch and true heading, shape (3, n), NaN where unknown."""
+    if states is not None:
+        at = states.at(flight.seconds(at_ns))
+        return np.stack([at.roll_deg, at.pitch_deg, at.true_heading_deg])
+    joined = join(unit, at_ns, ATTITUDE, largest_gap_s=settings.gap_max_s)
+    return np.where(joined.valid(*ATTITUDE), np.stack([joined.values(name) for name in ATTITUDE]), np.nan)
 
 
 def latency_of(topics: tuple[str, str], latencies: Delays | None) -> float:

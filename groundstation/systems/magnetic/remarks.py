@@ -25,7 +25,10 @@ def remarks_on(
         told.append(
             f"the INS heading is {result.alignment.origin}; a sigma of {settings.alignment_sigma_deg:g} deg is assumed"
         )
-    if settings.trusts_aided_heading:
+    by_states = result.alignment.source("states")
+    if by_states is not None and by_states.is_used:
+        told.append(f"{result.alignment.origin}: no magnetometer is in them")
+    elif settings.trusts_aided_heading:
         told.append("the settings state that no magnetometer corrects the INS heading; the log does not show it")
     elif kinds.get(result.ins_topic) != UNAIDED:
         told.append("the log does not show whether a magnetometer corrects the INS heading; none is assumed")

@@ -37,6 +37,8 @@ class MagneticSettings:
     declination_deg: float | None = number(None, -180.0, 180.0)  # in place of the model's: a log without date or place
     declination_sigma_deg: float = number(0.5, 0.0, 180.0)  # of the stated one
     attitude_wander_deg: float = number(0.04, 0.0, 10.0)  # of roll and pitch over minutes; level flight tells more
+    # Of the heading of a best trajectory in place of that of the INS; None: where it is surer than the INS; 0: never.
+    states_sigma_max_deg: float | None = number(None, 0.0, 180.0)
     trusts_aided_heading: bool = False  # True: an INS that GNSS corrects does not take its heading from a magnetometer
 
     # Turns and figures.

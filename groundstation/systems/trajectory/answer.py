@@ -11,7 +11,7 @@ from groundstation.results.arrays.states import BodyStates
 from groundstation.results.arrays.typed import found_in
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
-from groundstation.results.roles import StatesAlongTheFlight
+from groundstation.results.roles import ErrorsOfFilter, FilterError, FilterWrong, StatesAlongTheFlight
 
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
 
@@ -262,6 +262,10 @@ class WrongSpan:
     half95: float
     largest: float
 
+    def over(self, quantity: Quantity) -> float:
+        """Return what is sure of the error, over the one that a report opens with."""
+        return (abs(self.value) - self.half95) / OPENING_ERROR[quantity]
+
 
 @dataclass(frozen=True)
 class OnboardError:
@@ -335,7 +339,7 @@ class SeparationRow:
 
 
 @dataclass(frozen=True)
-class BestTrajectory(Answer, StatesAlongTheFlight):
+class BestTrajectory(Answer, StatesAlongTheFlight, ErrorsOfFilter):
     """Best trajectory of a flight, smoothed over raw inertial data and GNSS.
 
     Parameters
@@ -491,3 +495,27 @@ class BestTrajectory(Answer, StatesAlongTheFlight):
     def body_states(self) -> BodyStates | None:
         """Return the states, None where they are not kept."""
         return found_in(self.figures, BodyStates)
+
+    @property
+    def filter_topic(self) -> str:
+        """Topic of the filter whose errors are known; empty where none are, or the checks do not hold."""
+        return self.onboard.topic if self.onboard is not None and self.is_reference else ""
+
+    def filter_errors(self) -> tuple[FilterError, ...]:
+        """Return the errors of that filter by quantity."""
+        rows = self.onboard.rows if self.onboard is not None and self.is_reference else ()
+        whole_s = (self.start_s, self.end_s)
+        return tuple(
+            FilterError(
+                row.quantity,
+                row.unit,
+                row.rms,
+                row.sigma_rms,
+                tuple(
+                    FilterWrong((one.start_s, one.end_s), whole_s, one.value, one.half95, one.over(row.quantity))
+                    for one in row.spans
+                ),
+                row.offset_words,
+            )
+            for row in rows
+        )

@@ -1,5 +1,6 @@
 """Chapter on the best trajectory: doubt first, then the on-board filter and the accuracy."""
 
+from groundstation.base.words import places_of, with_half
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.gates import gate_grid
 from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Mark, Note, Part, Section, kept
@@ -29,10 +30,8 @@ from groundstation.systems.trajectory.claim_chapter import (
     wrong_texts,
 )
 from groundstation.systems.trajectory.wording_answer import (
-    places_of,
     sentence_of,
     when,
-    with_half,
 )
 
 TITLE = "Best trajectory"

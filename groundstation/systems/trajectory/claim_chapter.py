@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from groundstation.base.words import with_half
 from groundstation.chapters.parts import Claim, Mark, Rank
 from groundstation.chapters.wording import number, number_with_unit, significant, typeset, with_full_stop
 from groundstation.systems.trajectory.answer import BestTrajectory, OutageRow, TrajectoryState
@@ -12,7 +13,6 @@ from groundstation.systems.trajectory.wording_answer import (
     rounded,
     sentence_of,
     when,
-    with_half,
 )
 
 MARKS: Mapping[TrajectoryState, Mark] = {

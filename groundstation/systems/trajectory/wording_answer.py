@@ -1,17 +1,13 @@
 """Words for the best trajectory: state, accuracy, errors of the on-board filter."""
 
-import math
-
-from groundstation.base.words import clock_text
+from groundstation.base.words import places_of, span_text, with_half
 from groundstation.systems.trajectory.answer import (
-    OPENING_ERROR,
     BestTrajectory,
     OnboardError,
     Quantity,
     WrongSpan,
 )
 
-UNTIL_END_S = 15.0  # a span that ends so near the end of the track lasts on
 SHORT: tuple[tuple[Quantity, str], ...] = (
     ("heading", "heading"),
     ("tilt", "tilt"),
@@ -50,16 +46,9 @@ def opening_error(answer: BestTrajectory) -> tuple[OnboardError, WrongSpan] | No
     """
     if answer.state != "accepted" or answer.onboard is None:
         return None
-    found = [
-        (sure_size(span) / OPENING_ERROR[row.quantity], row, span) for row in answer.onboard.rows for span in row.spans
-    ]
+    found = [(span.over(row.quantity), row, span) for row in answer.onboard.rows for span in row.spans]
     ratio, row, span = max(found, key=lambda one: one[0], default=(0.0, None, None))
     return None if row is None or span is None or ratio < 1.0 else (row, span)
-
-
-def sure_size(span: WrongSpan) -> float:
-    """Return the size of an error that is sure: its value less half of its interval."""
-    return abs(span.value) - span.half95
 
 
 def error_words(answer: BestTrajectory, row: OnboardError, span: WrongSpan) -> str:
@@ -71,24 +60,7 @@ def error_words(answer: BestTrajectory, row: OnboardError, span: WrongSpan) -> s
 
 def when(answer: BestTrajectory, span: WrongSpan) -> str:
     """Return the time of a span: "12:03 to 14:10", "from 12:03 on", "throughout"."""
-    from_start, to_end = span.start_s - answer.start_s < UNTIL_END_S, answer.end_s - span.end_s < UNTIL_END_S
-    if from_start and to_end:
-        return "throughout"
-    if to_end:
-        return f"from {clock_text(span.start_s)} on"
-    return f"{clock_text(span.start_s)} to {clock_text(span.end_s)}"
-
-
-def with_half(value: float, half: float, unit: str) -> str:
-    """Return a value with half of its interval, rounded by the latter.
-
-    Examples
-    --------
-    >>> with_half(2.134, 0.31, "deg"), with_half(-18.27, 1.23, "m"), with_half(151.2, 32.0, "m")
-    ('2.1 +- 0.3 deg', '-18.3 +- 1.2 m', '151 +- 32 m')
-    """
-    places = places_of(half)
-    return f"{round(value, places) + 0.0:.{places}f} +- {half:.{places}f} {unit}".strip()
+    return span_text((span.start_s, span.end_s), (answer.start_s, answer.end_s))
 
 
 def rounded(value: float) -> str:
@@ -100,12 +72,3 @@ def rounded(value: float) -> str:
     ('0.3', '0.012', '1.8', '14')
     """
     return f"{value:.{places_of(value)}f}"
-
-
-def places_of(half: float) -> int:
-    """Return the decimals with one digit, two where it begins with a one."""
-    if not half > 0.0 or not math.isfinite(half):
-        return 1
-    exponent = math.floor(math.log10(half))
-    leading = round(half / 10.0**exponent, 1)
-    return min(max(-exponent + (1 if leading < 2.0 else 0), 0), 6)
