@@ -333,7 +333,9 @@ class FilterWrong:
 
 @dataclass(frozen=True)
 class FilterError:
-    """Error of an on-board filter in one quantity; what is constant all through the log is not in it.
+    """Error of an on-board filter in one quantity.
+
+    What is constant all through the log is not in it.
 
     Parameters
     ----------
@@ -356,11 +358,17 @@ class FilterError:
 
 
 class ErrorsOfFilter:
-    """Role of an answer with the errors of an on-board filter, judged by states that do not come from it."""
+    """Role of an answer with the errors of an on-board filter.
+
+    Judged by states that do not come from it.
+    """
 
     @property
     def filter_topic(self) -> str:
-        """Topic of the filter whose errors are known; empty where none are, or the checks do not hold."""
+        """Topic of the filter whose errors are known.
+
+        Empty where none are, or the checks do not hold.
+        """
         raise NotImplementedError
 
     @property

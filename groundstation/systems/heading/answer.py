@@ -124,7 +124,9 @@ class RunwayCheck:
 
 @dataclass(frozen=True)
 class HeadingByStates:
-    """Heading error by the heading of states of their own, on the same straights: a second interval.
+    """Heading error by the heading of states of their own, on the same straights.
+
+    A second interval.
 
     Both rest on the INS heading and on the velocity of GNSS and are never combined.
 

@@ -1,4 +1,7 @@
-"""Second interval of the heading error: the INS heading minus that of states of their own, on the straights used."""
+"""Second interval of the heading error.
+
+The INS heading minus that of states of their own, on the straights used.
+"""
 
 import numpy as np
 
@@ -19,7 +22,9 @@ FEWEST = 30  # epochs with states beside them
 def by_states(
     found: HeadingResult, states: StatesAlongTheFlight | None, settings: HeadingSettings, aircraft: AircraftData
 ) -> HeadingByStates | None:
-    """Return the heading error by the heading of states, at the epochs that the taxi number rests on.
+    """Return the heading error by the heading of states.
+
+    At the epochs that the taxi number rests on.
 
     Parameters
     ----------

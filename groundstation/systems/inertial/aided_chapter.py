@@ -129,7 +129,10 @@ def _sizes_told(judged: JudgedFilter) -> tuple[tuple[str, str, str], ...]:
 
 
 def _errors(judged: JudgedFilter | None) -> Note | None:
-    """Return its errors in a sentence; the chapter of what judges it has them along the flight."""
+    """Return its errors in a sentence.
+
+    The chapter of what judges it has them along the flight.
+    """
     if judged is None:
         return None
     constant = f" Constant, and no error of the filter: {'; '.join(judged.constants)}." if judged.constants else ""

@@ -41,7 +41,10 @@ class JudgedFilter:
 
     @property
     def errors(self) -> str:
-        """Words on the usual errors: "heading 0.41 deg (sigma 0.15) and roll 0.09 deg (sigma 0.05), RMS"."""
+        """Words on the usual errors.
+
+        "heading 0.41 deg (sigma 0.15) and roll 0.09 deg (sigma 0.05), RMS".
+        """
         told = [row for name in TOLD for row in self.rows if row.quantity == name]
         return f"{listed([_size(row) for row in told])}, RMS"
 

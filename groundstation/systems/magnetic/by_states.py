@@ -1,4 +1,7 @@
-"""States of their own as reference of attitude and heading, in place of the INS: no magnetometer is in them."""
+"""States of their own as reference of attitude and heading, in place of the INS.
+
+No magnetometer is in them.
+"""
 
 import math
 from dataclasses import dataclass
@@ -24,7 +27,10 @@ class StatesReference:
 
 
 def reference_of(answer: StatesAlongTheFlight | None, settings: MagneticSettings) -> StatesReference | None:
-    """Return the states of an answer; None where its checks do not hold, or the settings want none."""
+    """Return the states of an answer.
+
+    None where its checks do not hold, or the settings want none.
+    """
     if answer is None or not answer.is_reference or settings.states_sigma_max_deg == 0.0:
         return None
     states = answer.body_states()
@@ -39,7 +45,9 @@ def aligned_by_states(
     settings: MagneticSettings,
     aircraft: AircraftData,
 ) -> Alignment:
-    """Return what aligns where the states are the reference: nothing is removed, theirs is the sigma.
+    """Return what aligns where the states are the reference.
+
+    Nothing is removed, theirs is the sigma.
 
     It is that of their heading at the readings of the figures, taken as one error, with that of the mounting of the
     unit, for which the one of the INS stands.

@@ -498,7 +498,10 @@ class BestTrajectory(Answer, StatesAlongTheFlight, ErrorsOfFilter):
 
     @property
     def filter_topic(self) -> str:
-        """Topic of the filter whose errors are known; empty where none are, or the checks do not hold."""
+        """Topic of the filter whose errors are known.
+
+        Empty where none are, or the checks do not hold.
+        """
         return self.onboard.topic if self.onboard is not None and self.is_reference else ""
 
     def filter_errors(self) -> tuple[FilterError, ...]:
