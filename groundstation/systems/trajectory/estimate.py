@@ -180,7 +180,7 @@ def hypotheses_of(problem: Problem, model: Model, rules: Gate) -> tuple[Hypothes
     )
     early = int(np.searchsorted(plan.epoch_s, _first_motion_s(problem.gnss, plan.epoch_s[0]) + PRUNE_S))
     early = min(early, len(plan.epoch_s))
-    room = linear_room(problem.samples, plan)
+    room = linear_room(plan)
 
     def run(begin: int, end: int, now: Now, work: Room) -> float:
         return run_forward(
