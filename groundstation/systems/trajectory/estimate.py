@@ -131,6 +131,17 @@ class Estimate:
     travel: slip.Travel
 
     @property
+    def constant_sigma_m(self) -> FloatArray:
+        """Sigma of a constant error of GNSS position, north, east, down, shape (3,).
+
+        It is what the slow error leaves of what the receiver states.
+
+        An error that lasts longer than the log is seen by nothing in it: the fit takes it for none.
+        """
+        share = 1.0 - min(1.0, self.model.slow_scale) ** 2
+        return np.asarray(self.problem.sigma_m * np.sqrt(share))
+
+    @property
     def latency_s(self) -> float:
         """Latency of GNSS position."""
         return self.problem.latency_s + float(self.result.constants[LAT])

@@ -122,7 +122,10 @@ def output_samples(samples: Samples, first: int, rate_hz: float = OUTPUT_HZ) -> 
 
 
 def _slots(samples: Samples, first: Int64Array, ends: Int64Array) -> Int64Array:
-    """Return the row that keeps the estimate after each sample: at ends of epochs and where states are given."""
+    """Return the row that keeps the estimate after each sample.
+
+    At ends of epochs and where states are given.
+    """
     is_kept = np.zeros(len(samples.time_s), dtype=bool)
     is_kept[ends - 1] = True
     is_kept[output_samples(samples, int(first[0]))] = True
