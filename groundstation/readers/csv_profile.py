@@ -79,7 +79,10 @@ def _best(source: Source) -> tuple[float, Fit] | None:
         if is_near and not any(all(name in line.text for name in profile.required) for line in near):
             continue
         seen = head_lines(_seen(source, profile), encoding, most) if profile.is_spaced else lines
-        fit = _fit(profile, encoding, seen[: min(last, DAMAGED_HEAD_LINES) if is_near else last])
+        if profile.names:
+            fit = _without_header(profile, encoding, seen) if is_its_own else None
+        else:
+            fit = _fit(profile, encoding, seen[: min(last, DAMAGED_HEAD_LINES) if is_near else last])
         count = 0 if fit is None else sum(rule.name in fit.position for rule in profile.columns)
         if fit is not None and (is_its_own or count >= DISTINCTIVE_COLUMNS):
             found.append((1.0 if is_its_own else 0.9, fit))

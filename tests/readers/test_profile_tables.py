@@ -102,7 +102,10 @@ def test_a_leap_second_between_two_rows_counts(tmp_path: Path) -> None:
 
 def test_weeks_that_rolled_over_are_moved_and_told(tmp_path: Path) -> None:
     found = read(tmp_path, WEEKS, f"w,s,v\n{2313 - 1024},122418,1\n")
-    assert found.times("gnss") == [UTC] and "so the GPS week rolled over: read as 2024-05-06" in found.remarks["week_rollover"].text
+    assert (
+        found.times("gnss") == [UTC]
+        and "so the GPS week rolled over: read as 2024-05-06" in found.remarks["week_rollover"].text
+    )
     kept = read(tmp_path, WEEKS.replace("earliest_year = 2006\n", ""), "w,s,v\n1289,122418,1\n")
     assert kept.times("gnss") == [iso_to_utc_ns("2004-09-20T10:00:05Z")[0]]  # 13 leap seconds at that time
 
