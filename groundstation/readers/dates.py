@@ -1,6 +1,5 @@
 """Conversion of local date, time and UTC offset in columns of text to UTC nanoseconds."""
 
-from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -9,21 +8,8 @@ import pyarrow.compute as pc
 from groundstation.base import arrow_values as arrow
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
-from groundstation.readers.cells import MAX_TIME_NS, TableCells
-
-_NS_PER_DAY = 86_400 * NS_PER_S
-_EPOCH_DAY = datetime(1970, 1, 1).toordinal()
-
-
-def _day_ns(text: str, formats: tuple[str, ...]) -> int | None:
-    for form in formats:
-        try:
-            day_ns = (datetime.strptime(text, form).toordinal() - _EPOCH_DAY) * _NS_PER_DAY
-        except ValueError:
-            continue
-        if abs(day_ns) < MAX_TIME_NS - _NS_PER_DAY:
-            return day_ns
-    return None
+from groundstation.readers.cells import TableCells
+from groundstation.readers.days import day_ns
 
 
 def _time_of_day_ns(text: str, formats: tuple[str, ...]) -> int | None:
@@ -70,7 +56,7 @@ def local_ns(date: Any, time: Any, offset: Any | None, date_formats: tuple[str, 
     >>> read.column.values.tolist(), read.column.mask.tolist()
     ([1624454031000000000, 0], [True, False])
     """
-    days, has_day, bad_day = _each_distinct(date, _day_ns, date_formats)
+    days, has_day, bad_day = _each_distinct(date, day_ns, date_formats)
     times, has_time, bad_time = _each_distinct(time, _time_of_day_ns, ())
     unreadable = bad_day | bad_time
     if offset is None:
@@ -80,3 +66,16 @@ def local_ns(date: Any, time: Any, offset: Any | None, date_formats: tuple[str, 
         unreadable = unreadable | (bad_offset & has_day & has_time)
     present = has_day & has_time & ~unreadable
     return TableCells(Column(np.where(present, days + times - offsets, 0), present), unreadable)
+
+
+def time_of_day_ns(text: Any) -> TableCells:
+    """Nanoseconds since midnight of times such as ``14:13:51.25``.
+
+    Examples
+    --------
+    >>> import pyarrow as pa
+    >>> time_of_day_ns(pa.array(["00:00:01.5", "later", None])).column.values.tolist()
+    [1500000000, 0, 0]
+    """
+    values, known, unreadable = _each_distinct(text, _time_of_day_ns, ())
+    return TableCells(Column(values, known), unreadable)
