@@ -17,6 +17,7 @@ from groundstation.base.records import Damage, Item, LogHeader, RecordBatch, Rem
 from groundstation.base.slips import slips
 from groundstation.base.source_units import PREFIX, units_entry
 from groundstation.readers.dialect import DELIMITERS, Dialect, HeadLine, detect_encoding, head_lines
+from groundstation.readers.drafts.reasons import with_reasons
 from groundstation.readers.layout import TableLayout
 from groundstation.readers.misnamed import misnamed
 from groundstation.readers.profile import Profile, load, shipped
@@ -159,7 +160,11 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
     yield next(items)
     yield from dict.fromkeys([*remarks, *section_remarks, *unusable_references(metadata)])
     yield from () if above else _above(fit)
-    for item in misnamed(items, _slips(fit), fit.header.number):
+    time = ", ".join(name for name in fit.profile.time.columns if name in fit.position)
+    places = {f"{rule.topic}.{rule.field.name}": rule.name for rule in fit.profile.columns} | {
+        time: fit.profile.time.columns[0]
+    }
+    for item in with_reasons(misnamed(items, _slips(fit), fit.header.number), source, places, time):
         yield item if clock is None or not isinstance(item, RecordBatch) else _undrifted(item, clock)
 
 

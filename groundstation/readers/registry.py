@@ -293,9 +293,9 @@ def _unclaimed(source: Source, refusals: list[GroundstationError], troubles: lis
         if advice is not None:
             more = f" ({'; '.join(troubles)})" if troubles else ""
             return UnclaimedLogError(source.name, advice.found + more, "", advice.next_step)
-    found = "text that no reader claims"
-    if magic.is_binary(source):
-        found = "UTF-16 text without its mark" if magic.is_wide_text(source) else "binary data of an unknown format"
+    if magic.is_wide_text(source):
+        return UnclaimedLogError(source.name, "UTF-16 text without its mark", "UTF-8", "save it as CSV in UTF-8")
+    found = "binary data of an unknown format" if magic.is_binary(source) else "text that no reader claims"
     names = ", ".join(reader for reader in _readers())
     found += f" ({'; '.join(troubles)})" if troubles else ""
     next_step = f"write {FLAT_CSV}, or describe a table by a profile (--profile FILE)"

@@ -8,8 +8,10 @@ from typing import Any
 from groundstation.base.errors import UsageError
 from groundstation.base.findings import Finding
 from groundstation.integrity.ledger_findings import damage_finding
-from groundstation.readers.drafts.checked import ProfileCheck, check_profile
-from groundstation.readers.drafts.draft import Draft, draft_of, facts_of
+from groundstation.readers.drafts.checked import ProfileCheck as ProfileCheck
+from groundstation.readers.drafts.checked import check_profile
+from groundstation.readers.drafts.draft import Draft as Draft
+from groundstation.readers.drafts.draft import draft_of, facts_of
 from groundstation.readers.profile import SHIPPED, Profile
 from groundstation.readers.source import Source
 from groundstation.results.files import write_text

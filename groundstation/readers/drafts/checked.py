@@ -71,7 +71,8 @@ class ProfileCheck:
     @property
     def causes(self) -> tuple[str, ...]:
         """Columns whose cells cannot be read, and why."""
-        return tuple(f"column {one.name!r}: {one.cause}" for one in self.columns if one.cause)
+        told = " ".join(damage.what for damage in self.damages)
+        return tuple(f"column {one.name!r}: {one.cause}" for one in self.columns if one.cause and one.cause not in told)
 
     @property
     def has_lost_data(self) -> bool:

@@ -38,6 +38,7 @@ _TURNED: Mapping[str, Mapping[str, tuple[str, int]]] = {
     "+x": {"z": ("x", 1), "y": ("y", 1), "x": ("z", -1)},
     "-x": {"y": ("x", 1), "z": ("y", 1), "x": ("z", 1)},
 }
+_BODY_AXES = {"forward": "x", "right": "y", "down": "z"}
 _AXES_TOLD = {
     up: ", ".join(
         f"{'-' * (sign < 0)}{axis}" for _to, sign, axis in sorted((to, sign, axis) for axis, (to, sign) in axes.items())
@@ -306,14 +307,15 @@ class _Guesses:
 
     def _turned(self, guess: ColumnGuess) -> ColumnGuess:
         """Return an axis of an inertial unit as forward, right or down, by what reads gravity."""
-        match = re.fullmatch(r"imu\.(rate|accel)_([xyz])_(\w+)", guess.target)
+        match = re.fullmatch(r"(imu\.rate|imu\.accel|magnetometer\.field)_([a-z]+)_(\w+)", guess.target)
         if not match:
             return guess
-        up = self._up
+        is_field, up = match[1] == "magnetometer.field", self._up
         if up is None:
             return replace(guess, doubt=_both(guess, "axes forward, right, down assumed"))
-        field, sign = _TURNED[up][match[2]]
-        target = f"imu.{match[1]}_{field}_{match[3]}"
+        field, sign = _TURNED[up][_BODY_AXES.get(match[2], match[2])]
+        names = {axis: name for name, axis in _BODY_AXES.items()}
+        target = f"{match[1]}_{names[field] if is_field else field}_{match[3]}"
         reads = f"{up[1]} reads {up[0]}1 g: {_AXES_TOLD[up]} assumed to be forward, right, down"
         return replace(guess, target=target, sign=sign, doubt=_both(guess, reads))
 

@@ -48,7 +48,7 @@ def advice_on(source: Source, profiles: Iterable[Profile], page: str) -> Advice 
     try:
         time = time_of(sample)
     except GroundstationError as error:
-        return Advice(f"{found}{near}; {error.found}", error.next_step or f"then: {draft}")
+        return Advice(f"{found}{near}; {error.found}", error.next_step)
     names = _canonical(sample, time)
     return Advice(found + near, f"name them {', '.join(names)} ({page}), or: {draft}" if names else draft)
 
@@ -86,7 +86,9 @@ def _canonical(sample: TableSample, time: TimeGuess) -> list[str]:
     for at, meaning in enumerate(sample.meanings):
         if at in time.columns:
             names.append(of_time)
-        elif meaning is not None and meaning.field:
+        elif meaning is None or not meaning.field:
+            return []
+        else:
             if meaning.sign < 0 or meaning.scale != 1.0 or not _is_plain(meaning.unit, meaning.field):
                 return []
             names.append(meaning.target)

@@ -185,7 +185,7 @@ def _of_numbers(sample: TableSample) -> Iterator[TimeGuess]:
         known = values[np.isfinite(values)]
         if len(known) < 2 or len(known) < 0.5 * len(values) or not sample.is_of_numbers(at):
             continue
-        if not _rises(values) or np.ptp(known) <= 0.0 or np.any(known < 0.0):
+        if not _rises(values) or np.ptp(known) <= 0.0:
             continue
         middle, step = float(np.median(known)), _step(sample, at)
         since = next((unit for unit, (low, high) in _SINCE_1970.items() if low < middle < high), "")
