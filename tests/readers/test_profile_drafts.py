@@ -281,7 +281,7 @@ def test_a_profile_in_the_users_folder_is_found_by_the_header(own_profiles: Path
     code, out, err = groundstation("profile", "list")
     assert code == 0 and str(own_profiles / "mine.toml") in out and "bad.toml" in err
     other = write("b.csv", TABLE.replace("Heading", "Head"))
-    with pytest.raises(UnclaimedLogError, match="nearest is profile mine"):
+    with pytest.raises(UnclaimedLogError, match="nearest is profile mine: it lacks Heading"):
         registry.identify(other)
 
 
@@ -311,6 +311,28 @@ def test_the_verb_writes_a_profile_that_the_other_verbs_take(write: Write, tmp_p
     assert groundstation("profile", "new", str(tmp_path / "none.csv"))[0] == 2
     assert groundstation("profile", "check", str(target), str(tmp_path))[0] == 2
     assert groundstation("profile", "check", str(table), str(table))[0] == 2  # no TOML
+
+
+def test_the_tutorial_tells_what_the_verbs_print(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (Path(__file__).parents[2] / "docs/profiles.md").read_text(encoding="utf-8")
+    (table,) = re.findall(r"```csv\n(.*?)```", page, re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    Path("boat.csv").write_text(table, encoding="utf-8")
+    calls = re.findall(r"    \$ groundstation (.*)\n((?:    .*\n)+)", page)
+    assert [call.split()[:2] for call, _ in calls] == [["info", "boat.csv"], ["profile", "new"], ["profile", "check"]]
+    for call, shown in calls:
+        _, out, err = groundstation(*call.split())
+        assert out + err == re.sub("^    ", "", shown, flags=re.MULTILINE)
+        draft = Path("boat.toml")
+        if call.startswith("profile new"):
+            drafted_lines, edited = re.findall(
+                r"```toml\n(\[recognise\].*?)```\n.*?```toml\n(.*?)```", page, re.DOTALL
+            )[0]
+            assert drafted_lines in draft.read_text()
+            draft.write_text(re.sub(r'"Hdg" = .*\n', edited, draft.read_text()))
+    Path("boat.csv").write_text(table.replace("Hdg", "Compass"), encoding="utf-8")
+    code, out, _ = groundstation("profile", "check", "boat.toml", "boat.csv", "--fail-on", "warn")
+    assert code == 4 and (line := out[out.index("warn") :].splitlines()[0]) and f"    {line}\n" in page
 
 
 def bad_tables() -> Iterator[bytes]:

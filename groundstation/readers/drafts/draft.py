@@ -24,7 +24,7 @@ from groundstation.readers.drafts.words import words_of
 from groundstation.readers.source import Source
 
 MOST_LEFT = 100  # columns left over that the draft lists one by one
-_MOST_REQUIRED = 5
+_MOST_REQUIRED = 2  # besides the time: another name of any other column is told with the nearest ones
 _FLAGS = frozenset(("0", "1", "true", "false"))
 _G_MPS2, _FULL_FIELD_NT = 9.80665, 47_000.0  # the field of the Earth is 25 000 to 65 000 nT
 _DIRECTIONS = ("true_heading_deg", "magnetic_heading_deg", "track_deg")
@@ -220,7 +220,7 @@ class _Guesses:
         values = self._sample.numbers(guess.at)
         largest = float(np.nanpercentile(np.abs(values), 99))
         if largest <= most:
-            if guess.unit or "." in "".join(self._sample.filled(guess.at)[:20]):
+            if guess.unit or re.search("[.,]", "".join(self._sample.filled(guess.at)[:20])):
                 return "deg", ""
             return "deg", "degrees assumed"
         if largest > 1e5 and largest <= most * 1e7:
@@ -286,6 +286,8 @@ class _Guesses:
         if name == "true_heading_deg" and moved is not None and moved.is_followed(values * factor):
             doubt = "follows the motion: perhaps a track, gnss.track_deg"
             return replace(guess, doubt="; ".join(filter(None, (guess.doubt, doubt))))
+        if name == "true_heading_deg" and "true" not in words_of(guess.name):
+            guess = replace(guess, doubt=_both(guess, "true north assumed"))
         has_variation = any(one is not None and one.role == "variation" for one in self._sample.meanings)
         if name == "magnetic_heading_deg" and has_variation and "ins.true_heading_deg" not in self._by_target:
             return replace(guess, target="ins.true_heading_deg", north="magnetic")
@@ -419,7 +421,9 @@ def _recognise(sample: TableSample, time: TimeGuess, used: Sequence[ColumnGuess]
         yield "# ? the table names no columns: put the right names here, and below"
         yield f"names = [{', '.join(map(quoted, sample.names))}]"
         return
-    names = [*(sample.names[at] for at in time.columns[:2]), *(one.name for one in used[:_MOST_REQUIRED])]
+    places = [one.name for one in used if one.target.endswith(("latitude_deg", "longitude_deg"))]
+    needed = (places or [one.name for one in used])[:_MOST_REQUIRED]
+    names = [*(sample.names[at] for at in time.columns[:2]), *needed]
     yield f"columns = [{', '.join(map(quoted, dict.fromkeys(names)))}]"
     if sample.behind:
         yield f"rows_after_header = {len(sample.behind)}"

@@ -67,6 +67,8 @@ def _nearest(sample: TableSample, profiles: Iterable[Profile]) -> str:
         shared = sum(name.lower() in there for name in wanted)
         share = shared / max(1, len(wanted))
         if shared >= FEWEST_SHARED and share >= LEAST_SHARE and share > best[0]:
+            if not profile.first_lines:
+                asked |= dict.fromkeys(rule.name for rule in profile.columns if not rule.is_optional)
             missing = [name for name in asked if name.lower() not in there]
             lacks = f"it lacks {_listed(missing)}" if missing else "its first line is another"
             best = share, f"; nearest is profile {profile.name}: {lacks}"
