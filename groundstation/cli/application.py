@@ -75,7 +75,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     ),
     "compare": ("compare out/first out/second -o comparison",),
     "cooperative": ("cooperative a.csv b.csv --stations stations.toml -o out",),
-    "profile": ("profile new log.csv -o my.toml", "profile check my.toml log.csv", "info log.csv --profile my.toml"),
+    "profile": ("profile new log.csv -o my.toml", "profile check my.toml log.csv", "profile list"),
     "rules": ("rules test stricter.toml --over out", "rules test stricter.toml --over out -o changes.csv"),
     "serve": ("serve out",),
     "simulate": ("simulate taxi-good -o logs",),

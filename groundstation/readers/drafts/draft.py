@@ -109,7 +109,7 @@ class Draft:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What the user has to look at, a line each."""
+        """Lines that tell what the user has to look at."""
         told = [f"time: {self.time.doubt}"] if self.time.doubt else []
         return (*told, *(f"{one.name}: {one.doubt}" for one in self.columns if one.doubt))
 

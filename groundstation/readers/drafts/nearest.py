@@ -18,7 +18,7 @@ _MOST_SEARCHED = 500  # names among which a similar one is looked for
 
 @dataclass(frozen=True)
 class Advice:
-    """What a table is that no profile claims, and the next step."""
+    """Words on a table that no profile claims, and the next step."""
 
     found: str
     next_step: str

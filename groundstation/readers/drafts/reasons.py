@@ -1,4 +1,4 @@
-"""Reasons in the damage of a table: why the cells of a column cannot be read, where a cause is known."""
+"""Reasons in the damage of a table: why the cells of a column cannot be read."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace

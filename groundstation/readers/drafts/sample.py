@@ -33,7 +33,7 @@ ENOUGH = 0.9  # share of the cells that have to be numbers
 
 @dataclass(frozen=True)
 class TableSample:
-    """What is seen of a table.
+    """Part of a table that is looked at.
 
     Parameters
     ----------
