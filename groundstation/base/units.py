@@ -29,6 +29,7 @@ CONVERSIONS: Mapping[str, tuple[str, float]] = MappingProxyType(
         "deg": ("deg", 1.0),
         "rad": ("deg", DEG_PER_RAD),
         "arcmin": ("deg", 1.0 / 60.0),
+        "arcsec": ("deg", 1.0 / 3600.0),
         "deg1e7": ("deg", 1e-7),
         "semicircle": ("deg", 180.0),
         "m": ("m", 1.0),

@@ -7,7 +7,7 @@ cell stood that could not be read.
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+from numpy.typing import NDArray
 
 from groundstation.base import arrow_values as arrow
 from groundstation.base.errors import GroundstationError
@@ -27,6 +28,11 @@ _DECIMAL_DIGITS = 19  # digits before the point: what 64 bits can hold
 _DECIMAL = rf"^[+-]?\d{{1,{_DECIMAL_DIGITS}}}(?:\.\d*)?$"
 _EXPONENT = re.compile(r"[+-]?(?:\d{1,30}\.?\d{0,30}|\.\d{1,30})[eE][+-]?\d{1,2}")
 _INTEGER = r"^[+-]?\d{1,18}$"
+_DMS = (
+    r"^\s*(?P<before>[NSEWnsew]?)\s*(?P<sign>[+-]?)\s*(?P<degrees>\d{1,3})(?:\s*[:°d]\s*|\s+)"
+    r"(?P<minutes>\d{1,2}(?:\.\d*)?)(?:\s*[:'′m]\s*|\s+|$)"
+    r"(?P<seconds>(?:\d{1,2}(?:\.\d*)?)?)\s*[\"″s]?\s*(?P<behind>[NSEWnsew]?)\s*$"
+)
 _SLASHED = re.compile(r"\d{4}[/.]\d{1,2}[/.]\d{1,2}\b")
 _TWO_SIGNS = r"^\+-"  # a Garmin G5 writes its plus in front of every number
 _NOT_TEXT = r"[\x00-\x08\x0a-\x1e\x7f\x{FFFD}]"
@@ -48,6 +54,101 @@ def trimmed(text: Any) -> Any:
     """Trim cells; a cell of nothing but padding becomes empty (null)."""
     stripped = pc.utf8_trim_whitespace(text)
     return pc.if_else(pc.equal(stripped, arrow.EMPTY_TEXT), arrow.NO_TEXT, stripped)
+
+
+def without(text: Any, missing: Sequence[str]) -> Any:
+    """Return cells without those that mean no value."""
+    return pc.if_else(pc.is_in(text, value_set=arrow.texts(missing)), arrow.NO_TEXT, text)
+
+
+def part_of(text: Any, number: int) -> Any:
+    """Return one of the words of each cell, counted from 1; null where there are fewer.
+
+    Examples
+    --------
+    >>> part_of(pa.array(["47.5 -8.25", "47.5", None]), 2).to_pylist()
+    ['-8.25', None, None]
+    """
+    words = pc.extract_regex(text, rf"^(?:\S+[ ,]+){{{number - 1}}}(?P<word>[^\s,]+)")
+    return pc.struct_field(words, [0])
+
+
+def degrees(text: Any) -> TableCells:
+    """Convert degrees, minutes and seconds in one cell to degrees; plain degrees go through.
+
+    The parts may be parted by blanks, colons or their signs; the seconds may be absent. A sign stands before, or a
+    letter N, S, E or W on either side.
+
+    Examples
+    --------
+    >>> read = degrees(pa.array(["-0 30 00", "47:12:36.0", "8 30.5 W", "12°30′18″S", "-8.5", "47 61 0"]))
+    >>> read.column.values.tolist(), read.unreadable.tolist()
+    ([-0.5, 47.21, -8.508333333333333, -12.505, -8.5, nan], [False, False, False, False, False, True])
+    """
+    array, unreadable = _cast(text, pa.float64(), _NUMBER)
+    if not unreadable.any():
+        return TableCells(_column(array, float("nan")), unreadable)
+    parts = pc.extract_regex(text, _DMS)
+    before, sign, whole, minutes, seconds, behind = (pc.struct_field(parts, [at]) for at in range(6))
+    found = arrow.is_valid(whole)
+    values = [_part_values(one) for one in (whole, minutes, seconds)]
+    found &= (values[1] < 60.0) & (values[2] < 60.0)
+    letters = pc.binary_join_element_wise(before, sign, behind, "")
+    is_minus = arrow.mask(pc.fill_null(pc.match_substring_regex(letters, "[-SWsw]"), arrow.FALSE))
+    size = values[0] + values[1] / 60.0 + values[2] / 3600.0
+    plain = arrow.is_valid(array)
+    values_deg = np.where(plain, arrow.values(array, float("nan")), np.where(is_minus, -size, size))
+    present = plain | found
+    return TableCells(Column(np.where(present, values_deg, np.nan), present), arrow.is_valid(text) & ~present)
+
+
+def _part_values(text: Any) -> NDArray[np.float64]:
+    filled = pc.if_else(pc.equal(pc.fill_null(text, arrow.EMPTY_TEXT), arrow.EMPTY_TEXT), arrow.texts(["0"])[0], text)
+    return np.asarray(arrow.values(pc.cast(filled, pa.float64()), 0.0))
+
+
+def looked_up(text: Any, listed: Mapping[str, float | str | bool], filler: float | str | bool) -> TableCells:
+    """Convert cells to the values that are listed for them.
+
+    A number counts however it is written. A cell that is not listed is unreadable.
+
+    Examples
+    --------
+    >>> read = looked_up(pa.array(["1", "2.0", None, "7"]), {"1": 0.05, "2": 0.4}, float("nan"))
+    >>> read.column.values.tolist(), read.unreadable.tolist()
+    ([0.05, 0.4, nan, nan], [False, False, False, True])
+    """
+    coded = pc.dictionary_encode(text, null_encoding="encode")
+    found = [None if word is None else _listed(word, listed) for word in coded.dictionary.to_pylist()] or [None]
+    values = np.array([filler if one is None else one for one in found])
+    known = np.array([one is not None for one in found])
+    index = arrow.values(coded.indices, 0)
+    return TableCells(Column(values[index], known[index]), arrow.is_valid(text) & ~known[index])
+
+
+def _listed(word: str, listed: Mapping[str, float | str | bool]) -> float | str | bool | None:
+    if word in listed:
+        return listed[word]
+    try:
+        number = float(word)
+    except ValueError:
+        return None
+    return listed.get(f"{number:g}")
+
+
+def roots(read: TableCells) -> TableCells:
+    """Return standard deviations of variances; one below zero is unreadable.
+
+    Examples
+    --------
+    >>> read = roots(numbers(pa.array(["0.25", "-1"])))
+    >>> read.column.values.tolist(), read.unreadable.tolist()
+    ([0.5, nan], [False, True])
+    """
+    mask = read.column.mask
+    is_below = mask & (read.column.values < 0.0)
+    values = np.sqrt(np.where(is_below, np.nan, read.column.values))
+    return TableCells(Column(values, mask & ~is_below), read.unreadable | is_below)
 
 
 def _cast(text: Any, target: Any, pattern: str) -> tuple[Any, BoolArray]:

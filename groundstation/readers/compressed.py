@@ -80,7 +80,7 @@ def expand(stream: BinaryIO, compression: str, compressed_size: int, name: str) 
     limit = min(max(MAX_RATIO * compressed_size, MIN_LIMIT_BYTES), MAX_LIMIT_BYTES)
     size, damage = 0, None
     try:
-        file = _unnamed_file()
+        file = unnamed_file()
         try:
             for piece in _PIECES[compression](stream):
                 size += len(piece)
@@ -98,7 +98,7 @@ def expand(stream: BinaryIO, compression: str, compressed_size: int, name: str) 
     return Expanded(file, size, damage)
 
 
-def _unnamed_file() -> BinaryIO:
+def unnamed_file() -> BinaryIO:
     """Return an empty temporary file that is closed with its last user.
 
     Python does not warn that it was left open.

@@ -9,24 +9,27 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.slips import slips
-from groundstation.base.source_units import PREFIX, units_entry
-from groundstation.readers.dialect import DELIMITERS, Dialect, HeadLine, detect_encoding, head_lines
+from groundstation.readers.dates import day_ns
+from groundstation.readers.dialect import Dialect, HeadLine, detect_encoding, head_lines
 from groundstation.readers.drafts.reasons import with_reasons
 from groundstation.readers.layout import TableLayout
+from groundstation.readers.losses import Losses
 from groundstation.readers.misnamed import misnamed
 from groundstation.readers.profile import Profile, load, shipped
-from groundstation.readers.profile_fit import Fit, delimiter_of, fit_at, fit_below
+from groundstation.readers.profile_fit import Fit, delimiter_of, delimiters_of, fit_at, fit_below, joined_gaps
 from groundstation.readers.profile_layout import layout_of
 from groundstation.readers.profile_sources import other_profiles
 from groundstation.readers.rtklib_tag import TaggedClock, clock_by_tag
 from groundstation.readers.sections import MOST, TableSection, header_places, left_out, mark_of, told
 from groundstation.readers.source import Claim, Source
+from groundstation.readers.spaced import FixedSource, SpacedSource
 from groundstation.readers.start import unusable_references, utc_of_zero
 
 NAME = "csv-profile"
@@ -37,6 +40,9 @@ MOST_LINES = 10_000  # lines searched for it otherwise
 _OF_NUMBERS = frozenset(b"%c" % sign for sign in b"0123456789+-.,;")
 _COMMENTS = re.compile(r"\A(?:#[^\n]*\n\s*)+")
 FEWEST_ROWS = 3  # above the header row that are those of another log
+
+if TYPE_CHECKING:
+    from groundstation.readers.vehicles import Vehicles
 
 
 @cache
@@ -72,18 +78,26 @@ def _best(source: Source) -> tuple[float, Fit] | None:
     most = MOST_LINES if below else _HEAD_LINES if is_one else DAMAGED_HEAD_LINES
     lines = head_lines(source, encoding, most)
     found: list[tuple[float, Fit]] = []
+    last = len(lines)  # a relative has its header near by
     for profile in profiles:
         is_its_own = first.startswith(profile.first_lines) or row.startswith(profile.first_lines)
+        is_near = not is_its_own and profile.name not in below
+        near = lines[:DAMAGED_HEAD_LINES]
+        if is_near and not any(all(name in line.text for name in profile.required) for line in near):
+            continue
+        seen = head_lines(_seen(source, profile), encoding, most) if profile.is_spaced else lines
         if not profile.first_lines:
-            fit = _named_by(profile, encoding, lines)
+            fit = _named_by(profile, encoding, seen)
             found += [(1.0, fit)] if fit is not None else []
             continue
-        is_near = not is_its_own and profile.name not in below
-        fit = _fit(profile, encoding, lines[:DAMAGED_HEAD_LINES] if is_near else lines)
+        if profile.names:
+            fit = _without_header(profile, encoding, seen) if is_its_own else None
+        else:
+            fit = _fit(profile, encoding, seen[: min(last, DAMAGED_HEAD_LINES) if is_near else last])
         count = 0 if fit is None else sum(rule.name in fit.position for rule in profile.columns)
         if fit is not None and (is_its_own or count >= DISTINCTIVE_COLUMNS):
             found.append((1.0 if is_its_own else 0.9, fit))
-            lines = lines[: fit.header.number + DAMAGED_HEAD_LINES]  # a relative has its header near by
+            last = min(last, fit.header.number + DAMAGED_HEAD_LINES)
     best = max(found, key=lambda one: (one[0], -one[1].header.number), default=None)
     for one in found:
         if best is not None and one[1].header in best[1].behind and one[1].told_count > best[1].told_count:
@@ -132,8 +146,6 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
 
     It is read by ``profile``, or by the shipped profile that fits.
     """
-    from groundstation.readers.table_reader import TableReader, truncated_header
-
     if profile is not None:
         fit = _fitted(source, load(profile))
     else:
@@ -141,24 +153,38 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
         if found is None:
             raise UnreadableLogError(source.name, "no table of a known layout", "", "describe it by a profile")
         fit = found[1]
-    metadata = _metadata(fit)
-    utc_of_zero_ns, remarks = _utc_of_zero(fit, metadata)
+    yield from _items(source, _joined(source, fit))
+
+
+def _items(whole: Source, fit: Fit) -> Iterator[Item]:
+    """Yield the items of a table that a profile matches."""
+    from groundstation.readers.table_clock import with_clock
+    from groundstation.readers.table_reader import TableReader, truncated_header
+
+    source = _seen(whole, fit.profile, fit.cells, fit.joined)
+    utc_of_zero_ns, remarks = _utc_of_zero(fit, fit.metadata)
     clock: TaggedClock | None = None
     if fit.profile.time.has_tag and fit.last.ended:
         clock, remarks = _clock_by_tag(source, fit)
         utc_of_zero_ns = utc_of_zero_ns if clock is None else clock.utc_of_zero_ns
-    header = LogHeader(f"{NAME} {fit.profile.name}", metadata, utc_of_zero_ns)
+    header = LogHeader(f"{NAME} {fit.profile.name}", fit.metadata, utc_of_zero_ns)
     if not fit.last.ended:
         yield header
         yield truncated_header(fit.last.number)
         return
     sections, section_remarks = _sections(source, fit, utc_of_zero_ns)
     above = _rows_of_another(fit)
-    items = TableReader(source, [*([TableSection(above, sections[0].layout)] if above else []), *sections]).items(
-        header
-    )
+    sections = [*([TableSection(above, sections[0].layout)] if above else []), *sections]
+    header, sections, clock_remarks = with_clock(source, header, sections, fit.profile.time)
+    losses = Losses()
+    vehicles = _vehicles(source, fit, sections, losses)
+    if vehicles is not None:
+        source, sections = vehicles.source, list(vehicles.sections)
+        header = replace(header, metadata={**header.metadata, **sections[0].facts})
+        clock_remarks = (*clock_remarks, vehicles.remark)
+    items = TableReader(source, sections, losses).items(header)
     yield next(items)
-    yield from dict.fromkeys([*remarks, *section_remarks, *unusable_references(metadata)])
+    yield from dict.fromkeys([*remarks, *clock_remarks, *section_remarks, *unusable_references(fit.metadata)])
     yield from () if above else _above(fit)
     time = ", ".join(name for name in fit.profile.time.columns if name in fit.position)
     places = {f"{rule.topic}.{rule.field.name}": rule.name for rule in fit.profile.columns} | {
@@ -166,6 +192,16 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
     }
     for item in with_reasons(misnamed(items, _slips(fit), fit.header.number), source, places, time):
         yield item if clock is None or not isinstance(item, RecordBatch) else _undrifted(item, clock)
+
+
+def _vehicles(source: Source, fit: Fit, sections: Sequence[TableSection], losses: Losses) -> "Vehicles | None":
+    """Bring the rows of each vehicle together, if a column tells them apart."""
+    if not fit.profile.key:
+        return None
+    from groundstation.readers.vehicles import by_vehicle
+
+    name = fit.profile.key
+    return by_vehicle(source, sections[0], fit.position[name], name, fit.profile.only, losses)
 
 
 def _clock_by_tag(source: Source, fit: Fit) -> tuple[TaggedClock | None, list[Remark]]:
@@ -200,12 +236,31 @@ def _fit(profile: Profile, encoding: str, lines: Sequence[HeadLine]) -> Fit | No
     return None
 
 
+def _seen(source: Source, profile: Profile, cells: int = 0, joined: tuple[int, ...] = ()) -> Source:
+    """Return the source with tabs for blanks, or between columns of fixed width."""
+    if profile.widths:
+        return FixedSource(source.path, source, profile.widths)
+    return SpacedSource(source.path, source, cells, joined) if profile.has_blanks else source
+
+
+def _joined(source: Source, fit: Fit) -> Fit:
+    """Return a match whose rows have degrees, minutes and seconds in one cell.
+
+    It is the match itself where the names do not ask for that."""
+    cells, joined = joined_gaps(fit.profile, fit.names, fit.first_rows)
+    if not joined or fit.profile.names:
+        return fit
+    lines = head_lines(_seen(source, fit.profile, cells, joined), fit.encoding, MOST_LINES)
+    again = fit_at(fit.profile, fit.encoding, fit.delimiter, lines, fit.header.number - 1)
+    return replace(again, cells=cells, joined=joined)
+
+
 def _without_header(profile: Profile, encoding: str, lines: Sequence[HeadLine]) -> Fit | None:
     """Match a profile to a file without a header, most of whose first lines are rows of it."""
     at = next((place for place, line in enumerate(lines) if not line.text.startswith("#")), len(lines))
     top = lines[at - 1] if at else HeadLine(0, 0, "", ended=True)
     rows = tuple(line.text for line in lines[at : at + DAMAGED_HEAD_LINES] if line.text.strip())
-    for delimiter in DELIMITERS:
+    for delimiter in delimiters_of(profile):
         header = HeadLine(top.number, top.next_byte, "", ended=True)
         fit = Fit(profile, encoding, delimiter, profile.names, header, above=tuple(lines[:at]), first_rows=rows)
         if rows and 2 * sum(map(fit.is_row, rows)) >= len(rows):
@@ -216,19 +271,21 @@ def _without_header(profile: Profile, encoding: str, lines: Sequence[HeadLine]) 
 def _fitted(source: Source, profile: Profile) -> Fit:
     encoding = detect_encoding(source.head, source.name)
     if profile.names:
-        found = _without_header(profile, encoding, head_lines(source, encoding))
+        found = _without_header(profile, encoding, head_lines(_seen(source, profile), encoding))
         if found is None:
             expected = f"rows of {len(profile.names)} cells, numbers or times"
             raise UnreadableLogError(
                 source.name, f"no row for profile {profile.name}", expected, f"check {profile.path.name}"
             )
         return found
-    fit = _fit(profile, encoding, head_lines(source, encoding, MOST_LINES))
+    fit = _fit(profile, encoding, head_lines(_seen(source, profile), encoding, MOST_LINES))
     if fit is None:
         from groundstation.readers.drafts.nearest import why_no_header
 
-        wanted = ", ".join(dict.fromkeys((*profile.required, *profile.time.columns[:2])))
-        told = "; ".join(filter(None, (f"no header row for profile {profile.name}", why_no_header(source, profile))))
+        wanted = ", ".join(dict.fromkeys((*profile.required, *profile.time.asked)))
+        told = "; ".join(
+            filter(None, (f"no header row for profile {profile.name}", why_no_header(_seen(source, profile), profile)))
+        )
         raise UnreadableLogError(source.name, told, f"a row with the columns {wanted}", f"check {profile.path.name}")
     return fit
 
@@ -248,11 +305,11 @@ def _sections(
     fits, ends, shifts = [first], list[int](), [0]
     remarks: list[Remark | Damage] = []
     profile = first.profile
-    mark = mark_of(max((*profile.required, *profile.time.columns[:2]), key=len))
+    mark = mark_of(max((*profile.required, *profile.time.asked), key=len))
     stands_again, last_byte, own_until = False, None, first.last.number
     places = (
         ()
-        if profile.names
+        if profile.names or profile.key
         else header_places(source, first.last, first.encoding, mark, lambda line: bool(delimiter_of(line, profile)))
     )
     for place in places:
@@ -264,7 +321,7 @@ def _sections(
             continue
         found, end_byte = fit_below(source, fits[-1], place)
         own_until = found.last.number
-        utc_ns, _remarks = _utc_of_zero(found, _metadata(found))
+        utc_ns, _remarks = _utc_of_zero(found, found.metadata)
         shift_ns = shifts[-1] if utc_ns is None or utc_of_zero_ns is None else utc_ns - utc_of_zero_ns
         is_same = found.names_as(fits[-1])
         if is_same and shift_ns == shifts[-1]:
@@ -278,30 +335,23 @@ def _sections(
     sections = list[TableSection]()
     for fit, end, shift_ns in zip(fits, (*ends, last_byte), shifts, strict=True):
         layout, more = layout_of(fit, source, utc_of_zero_ns, end)
-        facts = _metadata(fit) if sections else {}
+        facts = fit.metadata if sections else {}
         sections.append(TableSection(fit.dialect_to(end, stands_again), layout, shift_ns, facts))
         remarks += more
     return sections, remarks
 
 
-def _metadata(fit: Fit) -> dict[str, str]:
-    text = "\n".join(line.text for line in (*fit.above, fit.header, *fit.behind))
-    found = dict(fit.profile.constants)
-    for key, pattern in fit.profile.find.items():
-        match = pattern.search(text)
-        if match:
-            found[key] = " ".join((match.group(1) or "").split())
-    for key, template in fit.profile.join.items():
-        names = {name: found.get(name, "") for name in (*fit.profile.find, *fit.profile.constants)}
-        found[key] = " ".join(template.format(**names).split())
-    units = units_entry(fit.units)
-    return found | {PREFIX + fit.profile.raw_topic: units} if units else found
-
-
 def _utc_of_zero(fit: Fit, metadata: Mapping[str, str]) -> tuple[int | None, list[Remark]]:
     time = fit.profile.time
-    if time.kind == "iso" or time.is_utc:
+    if time.kind in ("iso", "unix") or time.is_utc:
         return 0, []
+    if time.kind == "gps_week":
+        return 0, [Remark("converted", "times are GPS time: UTC is less the leap seconds of the day")]
+    if time.kind == "time_of_day":
+        told = metadata.get(time.date, "")
+        if day_ns(told, time.date_formats) is not None:
+            return 0, [Remark("assumed_utc", "the times of the day name no zone: read as UTC")]
+        return None, [Remark("no_date", f"no date ({told[:40]!r}): the flight has no absolute time")]
     if time.kind == "local":
         has_offset = len(time.columns) == 3 and time.columns[2] in fit.position
         assumed = Remark("assumed_utc", "date and time have no offset column: read as UTC")
@@ -326,6 +376,7 @@ def laid(source: Source, profile: Profile) -> tuple[Fit, TableLayout]:
     UnreadableLogError
         When the file has no header row with the columns that the profile asks for.
     """
-    fit = _fitted(source, profile)
-    utc_of_zero_ns, _remarks = _utc_of_zero(fit, _metadata(fit))
-    return fit, layout_of(fit, source, utc_of_zero_ns, None)[0]
+    fit = _joined(source, _fitted(source, profile))
+    seen = _seen(source, profile, fit.cells, fit.joined)
+    utc_of_zero_ns, _remarks = _utc_of_zero(fit, fit.metadata)
+    return fit, layout_of(fit, seen, utc_of_zero_ns, None)[0]

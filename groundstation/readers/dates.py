@@ -15,14 +15,21 @@ _NS_PER_DAY = 86_400 * NS_PER_S
 _EPOCH_DAY = datetime(1970, 1, 1).toordinal()
 
 
-def _day_ns(text: str, formats: tuple[str, ...]) -> int | None:
+def day_ns(text: str, formats: tuple[str, ...]) -> int | None:
+    """Return the beginning of a day, ns since 1970; None where no strptime format fits.
+
+    Examples
+    --------
+    >>> day_ns("2/1/70", ("%Y-%m-%d", "%d/%m/%y"))
+    86400000000000
+    """
     for form in formats:
         try:
-            day_ns = (datetime.strptime(text, form).toordinal() - _EPOCH_DAY) * _NS_PER_DAY
+            found_ns = (datetime.strptime(text, form).toordinal() - _EPOCH_DAY) * _NS_PER_DAY
         except ValueError:
             continue
-        if abs(day_ns) < MAX_TIME_NS - _NS_PER_DAY:
-            return day_ns
+        if abs(found_ns) < MAX_TIME_NS - _NS_PER_DAY:
+            return found_ns
     return None
 
 
@@ -70,7 +77,7 @@ def local_ns(date: Any, time: Any, offset: Any | None, date_formats: tuple[str, 
     >>> read.column.values.tolist(), read.column.mask.tolist()
     ([1624454031000000000, 0], [True, False])
     """
-    days, has_day, bad_day = _each_distinct(date, _day_ns, date_formats)
+    days, has_day, bad_day = _each_distinct(date, day_ns, date_formats)
     times, has_time, bad_time = _each_distinct(time, _time_of_day_ns, ())
     unreadable = bad_day | bad_time
     if offset is None:
@@ -80,3 +87,16 @@ def local_ns(date: Any, time: Any, offset: Any | None, date_formats: tuple[str, 
         unreadable = unreadable | (bad_offset & has_day & has_time)
     present = has_day & has_time & ~unreadable
     return TableCells(Column(np.where(present, days + times - offsets, 0), present), unreadable)
+
+
+def time_of_day_ns(text: Any) -> TableCells:
+    """Nanoseconds since midnight of times such as ``14:13:51.25``.
+
+    Examples
+    --------
+    >>> import pyarrow as pa
+    >>> time_of_day_ns(pa.array(["00:00:01.5", "later", None])).column.values.tolist()
+    [1500000000, 0, 0]
+    """
+    values, known, unreadable = _each_distinct(text, _time_of_day_ns, ())
+    return TableCells(Column(values, known), unreadable)

@@ -14,7 +14,10 @@ from groundstation.base.records import Column
 from groundstation.base.signals import Field
 
 RuleKind = Literal["double", "bool", "text", "raw"]
-TimeKind = Literal["seconds", "nanoseconds", "iso", "local"]
+TimeKind = Literal[
+    "seconds", "nanoseconds", "iso", "local", "unix", "gps_week", "time_of_day", "utc_counter", "utc_fraction"
+]
+Form = Literal["", "dms", "variance"]
 Key: TypeAlias = tuple[str, str]  # topic, field
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -38,6 +41,14 @@ class LayoutRule:
         Values are brought into [0, 360).
     raw : (topic, field), optional
         Where the number in the cell is kept when it is no value of the field.
+    form : {'', 'dms', 'variance'}
+        Degrees, minutes and seconds in one cell; a square whose root is the number.
+    values : tuple of (text, value)
+        Value of each text that a cell may hold: number, text or flag by ``kind``; empty: the cell is the value.
+    missing : tuple of text
+        Texts and numbers that mean no value.
+    part : int
+        Which of several words of the cell, from 1; 0: the whole cell.
     """
 
     column: int
@@ -48,6 +59,15 @@ class LayoutRule:
     offset: float = 0.0
     is_heading: bool = False
     raw: Key | None = None
+    form: Form = ""
+    values: tuple[tuple[str, float | str | bool], ...] = ()
+    missing: tuple[str, ...] = ()
+    part: int = 0
+
+    @property
+    def is_parsed(self) -> bool:
+        """Tell whether its cells are numbers that the CSV parser itself converts."""
+        return self.kind == "double" and self.form != "dms" and not self.values and not self.part
 
     @property
     def key(self) -> Key:
@@ -66,8 +86,10 @@ class TimeRule:
 
     Parameters
     ----------
-    kind : {'seconds', 'nanoseconds', 'iso', 'local'}
-        ``local`` is a date, a time of day and, as third, an offset from UTC in three columns of text.
+    kind : {'seconds', 'nanoseconds', 'iso', 'local', 'unix', 'gps_week', 'time_of_day', 'utc_counter', 'utc_fraction'}
+        ``local`` is a date, a time of day and, as third, an offset from UTC in three columns of text. ``gps_week`` is
+        week and seconds of the week. The last two are a counter and, behind it, the columns of UTC in whole seconds:
+        the counter runs on, or begins anew with each second.
     columns : tuple of int
         Positions of one column, or of date, time and (optionally) offset.
     names : tuple of str
@@ -76,6 +98,10 @@ class TimeRule:
         The unit is ``10**digits`` x ``multiple`` nanoseconds, for ``seconds``.
     date_formats : tuple of str
         strptime formats tried in turn, for ``local``.
+    weeks : int
+        Weeks to add, where the week rolled over.
+    day_ns : int
+        Beginning of the first row's day, for ``time_of_day``.
     """
 
     kind: TimeKind
@@ -84,6 +110,8 @@ class TimeRule:
     digits: int = 9
     multiple: int = 1
     date_formats: tuple[str, ...] = ()
+    weeks: int = 0
+    day_ns: int = 0
 
 
 @dataclass(frozen=True)
@@ -119,13 +147,17 @@ class Derivation:
 
 @dataclass(frozen=True)
 class TableLayout:
-    """Layout of a table: time, columns, derived fields."""
+    """Layout of a table: time, columns, derived fields.
+
+    ``missing`` are texts that mean no value in any column.
+    """
 
     time: TimeRule
     rules: tuple[LayoutRule, ...]
     derivations: tuple[Derivation, ...] = ()
     decimal_comma: bool = False
     metadata: Mapping[str, str] = field(default_factory=dict)
+    missing: tuple[str, ...] = ()
 
 
 def true_from_magnetic(magnetic_deg: FloatArray, variation_deg: FloatArray) -> tuple[FloatArray, ...]:
@@ -183,6 +215,50 @@ def pressure_altitude(indicated_m: FloatArray, setting_inhg: FloatArray) -> tupl
     return (indicated_m + setting_altitude_m,)
 
 
+def degrees_of(degrees_deg: FloatArray, minutes_deg: FloatArray, seconds_deg: FloatArray) -> tuple[FloatArray, ...]:
+    """Return an angle from degrees, which have the sign (-0 too), minutes and seconds.
+
+    Examples
+    --------
+    >>> float(degrees_of(np.array([-0.0]), np.array([30.0 / 60.0]), np.array([0.0]))[0][0])
+    -0.5
+    """
+    return (np.copysign(np.abs(degrees_deg) + np.abs(minutes_deg) + np.abs(seconds_deg), degrees_deg),)
+
+
+def root_of_squares(one: FloatArray, other: FloatArray) -> tuple[FloatArray, ...]:
+    """Return the root of the sum of squares: the horizontal sigma of two.
+
+    Examples
+    --------
+    >>> float(root_of_squares(np.array([3.0]), np.array([4.0]))[0][0])
+    5.0
+    """
+    return (np.hypot(one, other),)
+
+
+def attitude_of_quaternion(x: FloatArray, y: FloatArray, z: FloatArray, w: FloatArray) -> tuple[FloatArray, ...]:
+    """Return roll, pitch and heading of a quaternion.
+
+    It turns axes forward, left, up into east, north, up.
+
+    Examples
+    --------
+    A turn of 90 degrees about the vertical, from east to north:
+
+    >>> half = np.array([np.sqrt(0.5)])
+    >>> [round(float(one[0]), 9) for one in attitude_of_quaternion(0.0 * half, 0.0 * half, half, half)]
+    [0.0, -0.0, 0.0]
+    """
+    with np.errstate(invalid="ignore", divide="ignore"):
+        size = np.sqrt(x * x + y * y + z * z + w * w)
+        x, y, z, w = x / size, y / size, z / size, w / size
+        roll = np.arctan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
+        pitch = -np.arcsin(np.clip(2.0 * (w * y - x * z), -1.0, 1.0))
+        east_to_nose = np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+    return np.rad2deg(roll), np.rad2deg(pitch), np.asarray(wrap_360(90.0 - np.rad2deg(east_to_nose)))
+
+
 METHODS: Mapping[str, DerivationMethod] = MappingProxyType(
     {
         "true_from_magnetic": DerivationMethod(
@@ -208,6 +284,22 @@ METHODS: Mapping[str, DerivationMethod] = MappingProxyType(
             pressure_altitude,
             ("pressure_altitude_m",),
             "indicated altitude and altimeter setting",
+        ),
+        "from_degrees_minutes_seconds": DerivationMethod(
+            ("degrees", "minutes", "seconds"), ("deg", "deg", "deg"), degrees_of, (), "degrees, minutes and seconds"
+        ),
+        "horizontal_sigma": DerivationMethod(
+            ("north", "east"), ("m", "m"), root_of_squares, (), "the sigmas north and east"
+        ),
+        "velocity_sigma": DerivationMethod(
+            ("north", "east"), ("mps", "mps"), root_of_squares, (), "the sigmas of the velocity north and east"
+        ),
+        "attitude_from_quaternion": DerivationMethod(
+            ("x", "y", "z", "w"),
+            ("", "", "", ""),
+            attitude_of_quaternion,
+            ("roll_deg", "pitch_deg", "true_heading_deg"),
+            "a quaternion, taken as one that turns forward, left, up into east, north, up",
         ),
     }
 )

@@ -8,7 +8,7 @@ docs/profiles.md describes every key.
 
 import re
 import string
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -18,7 +18,7 @@ from groundstation.base.errors import SettingsError
 from groundstation.base.signals import RAW_PREFIX, Field, field_of, is_canonical
 from groundstation.base.toml_text import toml_table, toml_text
 from groundstation.base.units import factor_to, units_of
-from groundstation.readers.layout import METHODS, Key
+from groundstation.readers.layout import METHODS, Form, Key
 from groundstation.readers.told import HPA_PER_INHG
 
 SHIPPED = Path(__file__).parent / "profiles"
@@ -27,6 +27,8 @@ TIME_UNITS: Mapping[str, tuple[int, int]] = MappingProxyType(
     {"ns": (0, 1), "us": (3, 1), "ms": (6, 1), "s": (9, 1), "min": (9, 60), "h": (9, 3600)}
 )
 DIRECTIONS = ("track_deg", "true_heading_deg")  # directions of which a profile may state the north
+MOST_WIDTHS = 10_000
+_OF_CELLS = ("values", "variance", "missing", "part")
 _DATE_DIRECTIVES = frozenset("YymdbBj")
 
 
@@ -35,7 +37,8 @@ class ColumnRule:
     """One column: the field it feeds, and ``number x factor + offset`` in the field's unit.
 
     ``north`` is that of a direction where the file says nothing else; ``unit_factor`` is the unit's part of the factor.
-    A column that is optional is not missed.
+    A column that is optional is not missed. ``form``, ``values``, ``missing`` and ``part`` are those of
+    :class:`groundstation.readers.layout.LayoutRule`.
     """
 
     name: str
@@ -46,6 +49,10 @@ class ColumnRule:
     unit_factor: float = 1.0
     north: str = ""
     is_optional: bool = False
+    form: Form = ""
+    values: tuple[tuple[str, float | str | bool], ...] = ()
+    missing: tuple[str, ...] = ()
+    part: int = 0
 
 
 @dataclass(frozen=True)
@@ -77,6 +84,8 @@ class TimeColumns:
     The kinds are those of :class:`groundstation.readers.layout.TimeRule`.
 
     ``is_utc``: date and time of kind ``local`` are UTC. ``has_tag``: a time tag of RTKLIB beside the file tells UTC.
+    ``date``: key of the metadata that tells the day, for ``time_of_day``. ``earliest_year``: before it the format did
+    not exist, for ``gps_week``.
     """
 
     kind: str
@@ -85,6 +94,13 @@ class TimeColumns:
     date_formats: tuple[str, ...] = ()
     is_utc: bool = False
     has_tag: bool = False
+    date: str = ""
+    earliest_year: int = 0
+
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """Columns that a header row must have."""
+        return self.columns[:2]
 
 
 @dataclass(frozen=True)
@@ -101,7 +117,9 @@ class Profile:
 
     ``header_tells``: the file's own names and rows of units settle unit, north and height where they say something, and
     a column may have its unit in parentheses behind its name. ``has_second_names``: a row of other names may follow.
-    ``names`` are those of the columns of a file that has no header row.
+    ``names`` are those of the columns of a file that has no header row. ``has_blanks``: blanks part the columns;
+    ``widths``: they stand at fixed places. ``missing``: texts and numbers that mean no value. ``key``: the column that
+    tells vehicles apart, each of which has a log of its own; ``only``: those that are read, all if empty.
     """
 
     name: str
@@ -116,11 +134,21 @@ class Profile:
     time: TimeColumns
     variation: Variation | None = None
     names: tuple[str, ...] = ()
+    has_blanks: bool = False
+    widths: tuple[int, ...] = ()
+    missing: tuple[str, ...] = ()
+    key: str = ""
+    only: tuple[str, ...] = ()
     columns: tuple[ColumnRule, ...] = ()
     derived: tuple[DerivedRule, ...] = ()
     constants: Mapping[str, str] = field(default_factory=dict)
     find: Mapping[str, re.Pattern[str]] = field(default_factory=dict)
     join: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def is_spaced(self) -> bool:
+        """Tell whether no delimiter parts the columns."""
+        return self.has_blanks or bool(self.widths)
 
 
 def shipped() -> tuple[Profile, ...]:
@@ -136,7 +164,17 @@ def load(path: Path) -> Profile:
     SettingsError
         Naming the file and the key: not TOML, an unknown key, unit, field or method, a wrong dimension ...
     """
+    path = known_as(path)
     return _Checker(path).profile(read_table(path))
+
+
+def known_as(path: Path) -> Path:
+    """Return the path of a profile: of a shipped one where its name is given.
+
+    A file of that name comes first.
+    """
+    shipped_path = SHIPPED / f"{path.name.replace('-', '_')}.toml"
+    return shipped_path if not path.exists() and len(path.parts) == 1 and shipped_path.exists() else path
 
 
 def read_table(path: Path) -> dict[str, Any]:
@@ -223,14 +261,26 @@ class _Checker(Checker):
     def profile(self, table: dict[str, Any]) -> Profile:
         allowed = (
             *("name", "description", "raw_topic", "recognise", "time", "metadata", "variation", "columns", "derived"),
+            *("missing", "key"),
         )
         table = self.table(table, "", allowed, ("name", "time", "columns"))
         name = self.text(table["name"], "name")
         raw_topic = RAW_PREFIX + self.text(table.get("raw_topic", name), "raw_topic").removeprefix(RAW_PREFIX)
-        keys = ("first_line", "columns", "names", "rows_after_header", "header_tells", "second_names")
+        keys = (
+            "first_line",
+            "columns",
+            "names",
+            "rows_after_header",
+            "header_tells",
+            "second_names",
+            "delimiter",
+            "widths",
+        )
         recognise = self.table(table.get("recognise", {}), "recognise", keys)
         time = self.time(table["time"])
-        columns = self.columns(table["columns"])
+        missing = self.missing(table.get("missing", []), "missing")
+        columns = self.columns(table["columns"], missing)
+        key = self.table(table.get("key", {}), "key", ("column", "only"), ("column",) if "key" in table else ())
         metadata = self.table(table.get("metadata", {}), "metadata", ("find", "join", "set"))
         find, constants, join = (
             self.table(metadata.get(name, {}), f"metadata.{name}", ()) for name in ("find", "set", "join")
@@ -239,6 +289,8 @@ class _Checker(Checker):
         constants = {key: self.text(value, f"metadata.set.{key}") for key, value in constants.items()}
         known = find.keys() | constants.keys()
         names = self.texts(recognise["names"], "recognise.names") if "names" in recognise else ()
+        if time.date and time.date not in known:
+            self.fail("time.date", repr(time.date), "a name of metadata.find or metadata.set")
         if names and not {*(rule.name for rule in columns), *time.columns} <= set(names):
             self.fail("recognise.names", ", ".join(names), "every column that the profile names")
         rows_after = self.number(recognise.get("rows_after_header", 0), "recognise.rows_after_header")
@@ -253,6 +305,11 @@ class _Checker(Checker):
             required=self.texts(recognise["columns"], "recognise.columns")
             if "columns" in recognise
             else time.columns[:1],
+            has_blanks=self.has_blanks(recognise),
+            widths=self.widths(recognise.get("widths", [])),
+            missing=missing,
+            key=self.text(key["column"], "key.column") if key else "",
+            only=self.texts(key["only"], "key.only") if "only" in key else (),
             rows_after_header=int(rows_after),
             header_tells=self.flag(recognise.get("header_tells", False), "recognise.header_tells"),
             has_second_names=self.flag(recognise.get("second_names", False), "recognise.second_names"),
@@ -269,6 +326,39 @@ class _Checker(Checker):
     def first_lines(self, value: Any) -> tuple[str, ...]:
         texts = value if isinstance(value, list) else [value]
         return tuple(self.text(text, "recognise.first_line") for text in texts)
+
+    def has_blanks(self, recognise: Mapping[str, Any]) -> bool:
+        if recognise.get("delimiter", "blanks") != "blanks":
+            self.fail(
+                "recognise.delimiter", repr(recognise["delimiter"]), '"blanks" (comma, semicolon and tab are found)'
+            )
+        if "delimiter" in recognise and "widths" in recognise:
+            self.fail("recognise.delimiter", "widths beside it", "one of the two")
+        return "delimiter" in recognise
+
+    def widths(self, value: Any) -> tuple[int, ...]:
+        if not isinstance(value, list) or len(value) > MOST_WIDTHS:
+            self.fail("recognise.widths", repr(value)[:40], f"a list of up to {MOST_WIDTHS} whole numbers")
+        found = [self.number(width, "recognise.widths") for width in value]
+        if any(width != int(width) or not 1 <= width <= MOST_WIDTHS for width in found):
+            self.fail("recognise.widths", repr(value)[:40], f"whole numbers from 1 to {MOST_WIDTHS}")
+        return tuple(map(int, found))
+
+    def missing(self, value: Any, key: str) -> tuple[str, ...]:
+        """Return texts; numbers in the list are texts too."""
+        if not isinstance(value, list):
+            self.fail(key, repr(value), 'a list such as ["N/A", "-", 9999]')
+        return tuple(one if isinstance(one, str) else f"{self.number(one, key):g}" for one in value)
+
+    def listed(self, value: Any, key: str, kind: str) -> tuple[tuple[str, float | str | bool], ...]:
+        """Return the values of the texts that a cell may hold."""
+        readers: dict[str, Callable[[Any, str], float | str | bool]]
+        readers = {"double": self.number, "text": self.text, "bool": self.flag}
+        read = readers[kind]
+        found = [(text, read(one, f"{key}.{text}")) for text, one in self.table(value, key, ()).items()]
+        if not found:
+            self.fail(key, "nothing", "a value for each text of the column")
+        return tuple(found)
 
     def flag(self, value: Any, key: str) -> bool:
         if not isinstance(value, bool):
@@ -304,40 +394,79 @@ class _Checker(Checker):
         return text
 
     def time(self, value: Any) -> TimeColumns:
-        kinds = ("seconds", "nanoseconds", "iso", "local")
+        kinds = ("seconds", "nanoseconds", "iso", "local", "unix", "gps_week", "time_of_day", "utc_counter")
         table = self.table(value, "time", (), ("kind",))
         kind = self.text(table["kind"], "time.kind")
         if kind not in kinds:
             self.fail("time.kind", repr(kind), f"one of {', '.join(kinds)}")
         if kind == "local":
             return self.local_time(table)
-        allowed = ("kind", "column", "unit", "rtklib_tag") if kind == "seconds" else ("kind", "column")
-        self.table(table, "time", allowed, ("column",))
+        if kind == "utc_counter":
+            return self.counter_time(table)
+        if kind == "gps_week":
+            self.table(table, "time", ("kind", "week", "seconds", "unit", "earliest_year"), ("week", "seconds"))
+            year = self.number(table.get("earliest_year", 0), "time.earliest_year")
+            names = tuple(self.text(table[key], f"time.{key}") for key in ("week", "seconds"))
+            return TimeColumns(kind, names, self.time_unit(table), earliest_year=self.year(year))
+        if kind == "time_of_day":
+            self.table(table, "time", ("kind", "column", "date", "date_formats"), ("column", "date"))
+            names = (self.text(table["column"], "time.column"),)
+            return TimeColumns(
+                kind, names, date_formats=self.date_formats(table), date=self.text(table["date"], "time.date")
+            )
+        allowed = {"seconds": ("kind", "column", "unit", "rtklib_tag"), "unix": ("kind", "column", "unit")}
+        self.table(table, "time", allowed.get(kind, ("kind", "column")), ("column",))
+        has_tag = self.flag(table.get("rtklib_tag", False), "time.rtklib_tag")
+        return TimeColumns(kind, (self.text(table["column"], "time.column"),), self.time_unit(table), has_tag=has_tag)
+
+    def time_unit(self, table: dict[str, Any]) -> tuple[int, int]:
         unit = table.get("unit", "s")
         if not isinstance(unit, str) or unit not in TIME_UNITS:
             self.fail("time.unit", repr(unit), f"one of {', '.join(TIME_UNITS)}")
-        has_tag = self.flag(table.get("rtklib_tag", False), "time.rtklib_tag")
-        return TimeColumns(kind, (self.text(table["column"], "time.column"),), TIME_UNITS[unit], has_tag=has_tag)
+        return TIME_UNITS[unit]
+
+    def year(self, value: float) -> int:
+        if value != int(value) or (value and not 1980 <= value <= 2100):
+            self.fail("time.earliest_year", f"{value:g}", "a year from 1980 on")
+        return int(value)
+
+    def counter_time(self, table: dict[str, Any]) -> TimeColumns:
+        """Return the columns of a counter and of UTC in whole seconds."""
+        allowed = ("kind", "counter", "unit", "utc", "date", "time", "date_formats")
+        self.table(table, "time", allowed, ("counter",))
+        keys = ["counter", *(["utc"] if "utc" in table else ["date", "time"])]
+        self.table(table, "time", ("kind", "unit", "date_formats", *keys), keys)
+        names = tuple(self.text(table[key], f"time.{key}") for key in keys)
+        return TimeColumns("utc_counter", names, self.time_unit(table), self.date_formats(table))
 
     def local_time(self, table: dict[str, Any]) -> TimeColumns:
         self.table(table, "time", ("kind", "date", "time", "offset", "date_formats"), ("date", "time"))
         is_utc = table.get("offset") == "UTC"
         keys = [key for key in ("date", "time", "offset") if key in table and not (key == "offset" and is_utc)]
         names = [self.text(table[key], f"time.{key}") for key in keys]
+        return TimeColumns("local", tuple(names), date_formats=self.date_formats(table), is_utc=is_utc)
+
+    def date_formats(self, table: dict[str, Any]) -> tuple[str, ...]:
         formats = self.texts(table.get("date_formats", ["%Y-%m-%d"]), "time.date_formats")
         for form in formats:
             used = set(re.findall(r"%(.)", form))
             if not used or not used <= _DATE_DIRECTIVES:
                 self.fail("time.date_formats", repr(form), "a date such as %Y-%m-%d")
-        return TimeColumns("local", tuple(names), date_formats=formats, is_utc=is_utc)
+        return formats
 
-    def columns(self, value: Any) -> tuple[ColumnRule, ...]:
+    def columns(self, value: Any, missing: tuple[str, ...] = ()) -> tuple[ColumnRule, ...]:
         rules: list[ColumnRule] = []
         feeding: dict[str, ColumnRule] = {}
-        for name, entry in self.table(value, "columns", ()).items():
+        entries = [
+            (name, one)
+            for name, entry in self.table(value, "columns", ()).items()
+            for one in (entry if isinstance(entry, list) else [entry])
+        ]
+        for name, entry in entries:
             key = f"columns.{name}"
-            allowed = ("field", "unit", "scale", "sign", "offset", "north", "optional")
+            allowed = ("field", "unit", "scale", "sign", "offset", "north", "optional", *_OF_CELLS)
             table = dict(self.table(entry, key, allowed, ("field",)))
+            of_cells = {name: table.pop(name) for name in _OF_CELLS if name in table}
             north = self.north(table.pop("north", ""), f"{key}.north")
             is_optional = self.flag(table.pop("optional", False), f"{key}.optional")
             topic, known = self.canonical(table["field"], f"{key}.field")
@@ -347,10 +476,30 @@ class _Checker(Checker):
             other = feeding.get(target)
             if other is not None and not (is_optional and other.is_optional):
                 self.fail(f"{key}.field", target, f"a field that {other.name!r} does not feed already")
+            is_dms = table.get("unit") == "dms" and known.unit == "deg"
+            table |= {"unit": "deg"} if is_dms else {}
             rule = replace(self.column(name, key, topic, known, table), north=north, is_optional=is_optional)
+            rule = self.with_cells(replace(rule, form="dms" if is_dms else ""), of_cells, key, missing)
             feeding.setdefault(target, rule)
             rules.append(rule)
         return tuple(rules)
+
+    def with_cells(self, rule: ColumnRule, given: dict[str, Any], key: str, missing: tuple[str, ...]) -> ColumnRule:
+        """Return a rule with what is said of the cells of its column."""
+        kind = rule.field.kind
+        if self.flag(given.get("variance", False), f"{key}.variance"):
+            if kind != "double" or rule.form or not rule.field.name.rpartition("_")[0].endswith("sigma"):
+                self.fail(f"{key}.variance", rule.field.name, "a field of a sigma")
+            rule = replace(rule, form="variance")
+        if "values" in given:
+            if rule.form:
+                self.fail(f"{key}.values", "a variance or degrees, minutes and seconds", "one of the two")
+            rule = replace(rule, values=self.listed(given["values"], f"{key}.values", kind))
+        part = self.number(given.get("part", 0), f"{key}.part")
+        if part != int(part) or not 0 <= part <= 20:
+            self.fail(f"{key}.part", f"{part:g}", "a whole number from 1 to 20")
+        own = self.missing(given.get("missing", []), f"{key}.missing")
+        return replace(rule, missing=(*missing, *own), part=int(part))
 
     def north(self, value: Any, key: str) -> str:
         if value not in ("", "true", "magnetic"):

@@ -1,10 +1,12 @@
 """Match of a profile to a header of a table: its columns and the lines around it."""
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from groundstation.base.source_units import PREFIX, units_entry
 from groundstation.readers.dialect import DELIMITERS, Dialect, HeadLine, normal_form, split_cells, trailing_cells
 from groundstation.readers.profile import Profile
 from groundstation.readers.sections import HeaderPlace, lines_below
@@ -17,7 +19,14 @@ _TIMES: Mapping[str, re.Pattern[str]] = {
     "iso": re.compile(r"\d{4}[-/.]?\d\d?.*"),
     "seconds": re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?"),
     "nanoseconds": re.compile(r"[+-]?\d+"),
+    "utc_counter": re.compile(r".*\d.*"),
 }
+_LIKE = {
+    "unix": "seconds",
+    "gps_week": "seconds",
+    "time_of_day": "local",
+}  # kinds of time that are written like another
+_WORDS = re.compile(r"\([^()]*\)|[^\s()]+")
 _FORMAT = re.compile(r"(?=.*(yy|hh))[ymdhs:./ -]+", re.IGNORECASE)  # the unit of a date or a time of day
 
 
@@ -39,6 +48,10 @@ class Fit:
     rows_above : tuple of HeadLine
         Rows above the header.
     first_rows : tuple of str
+    cells : int
+        Number of cells of a row before those that belong together were joined; 0: none are.
+    joined : tuple of int
+        Gaps between cells of such a row that part none.
     """
 
     profile: Profile
@@ -50,6 +63,29 @@ class Fit:
     above: tuple[HeadLine, ...] = ()
     rows_above: tuple[HeadLine, ...] = ()
     first_rows: tuple[str, ...] = ()
+    cells: int = 0
+    joined: tuple[int, ...] = ()
+
+    @property
+    def _time_form(self) -> re.Pattern[str]:
+        kind = self.profile.time.kind
+        return _TIMES[_LIKE.get(kind, kind)]
+
+    @cached_property
+    def metadata(self) -> dict[str, str]:
+        """Metadata that the lines around the header tell."""
+        text = "\n".join(line.text for line in (*self.above, self.header, *self.behind))
+        text = text.replace("\t", " ") if self.profile.is_spaced else text  # as the file has it
+        found = dict(self.profile.constants)
+        for key, pattern in self.profile.find.items():
+            match = pattern.search(text)
+            if match:
+                found[key] = " ".join((match.group(1) or "").split())
+        for key, template in self.profile.join.items():
+            names = {name: found.get(name, "") for name in (*self.profile.find, *self.profile.constants)}
+            found[key] = " ".join(template.format(**names).split())
+        units = units_entry(self.units)
+        return found | {PREFIX + self.profile.raw_topic: units} if units else found
 
     @property
     def last(self) -> HeadLine:
@@ -135,13 +171,13 @@ class Fit:
         """Tell whether a line is a row: a cell for each column, and a time or some number."""
         times, others = self._times(line)
         if any(times):
-            return bool(_TIMES[self.profile.time.kind].fullmatch(times[-1]))
+            return bool(self._time_form.fullmatch(times[-1]))
         return any(_TIMES["seconds"].fullmatch(cell) for cell in others)
 
     def is_of_names(self, line: str) -> bool:
         """Tell whether a line has names or units: words for the columns of time, no number."""
         times, others = self._times(line.lstrip("#"))
-        is_time = bool(times) and bool(_TIMES[self.profile.time.kind].fullmatch(times[-1]))
+        is_time = bool(times) and bool(self._time_form.fullmatch(times[-1]))
         return bool(times) and all(times) and not is_time and not any(map(_TIMES["seconds"].fullmatch, others))
 
     def _times(self, line: str) -> tuple[list[str], list[str]]:
@@ -149,25 +185,61 @@ class Fit:
         cells = split_cells(line, self.delimiter)
         if len(cells) not in (len(self.names), len(self.names) + 1) or line.startswith("#"):
             return [], []
-        at = [self.position[name] for name in self.profile.time.columns[:2]]
+        at = [self.position[name] for name in self.profile.time.asked]
         return [cells[one] for one in at], [cell for one, cell in enumerate(cells) if one not in at]
 
     def _cells(self, line: str) -> list[str]:
         """Return the cells of a line near the header; none if their number is wrong."""
         cells = [cell.strip() for cell in split_cells(line.lstrip("# "), self.delimiter)]
+        if len(cells) != len(self.names) and self.profile.has_blanks and line in [one.text for one in self.behind]:
+            return self._below_names(line)
         return cells if len(cells) == len(self.names) else []
+
+    def _below_names(self, line: str) -> list[str]:
+        """Return the words of a row of units by the names that they stand below.
+
+        Blanks part names and units.
+        """
+        names = [one.span() for one in re.finditer(r"\S+", self.header.text)]
+        if len(names) != len(self.names):
+            return []
+        cells = [""] * len(names)
+        for word in _WORDS.finditer(line.replace("\t", " ")):
+            apart = [max(first - word.end(), word.start() - end) for first, end in names]
+            nearest = min(range(len(names)), key=lambda at: (apart[at], abs(names[at][1] - word.end())))
+            cells[nearest] = f"{cells[nearest]} {word[0]}".strip()
+        return cells
 
 
 def delimiter_of(line: str, profile: Profile) -> str:
     """Return the delimiter of a line that is a header row of a profile, else nothing."""
-    wanted = {*profile.required, *profile.time.columns[:2]}
+    wanted = {*profile.required, *profile.time.asked, *((profile.key,) if profile.key else ())}
     if not all(name in line for name in wanted):
         return ""
-    for delimiter in DELIMITERS:
+    for delimiter in delimiters_of(profile):
         names = _names(line, delimiter, profile)
         if wanted.issubset(names) or (profile.header_tells and wanted.issubset(map(bare, names))):
             return delimiter
     return ""
+
+
+def delimiters_of(profile: Profile) -> tuple[str, ...]:
+    """Return the delimiters that may part the columns; blanks are seen as tabs."""
+    return ("\t",) if profile.is_spaced else DELIMITERS
+
+
+def joined_gaps(profile: Profile, names: Sequence[str], rows: Sequence[str]) -> tuple[int, tuple[int, ...]]:
+    """Return the number of cells of rows that have degrees, minutes, seconds apart.
+
+    Returns also the gaps between these cells, counted from 0; 0 and none where the rows have a cell for each name.
+    """
+    of_angles = {rule.name for rule in profile.columns if rule.form == "dms"}
+    places = [at for at, name in enumerate(names) if name in of_angles or bare(name) in of_angles]
+    counts = Counter(len(split_cells(row, "\t")) for row in rows if row.strip())
+    cells = counts.most_common(1)[0][0] if counts else 0
+    if not profile.has_blanks or not places or cells != len(names) + 2 * len(places):
+        return 0, ()
+    return cells, tuple(gap for number, at in enumerate(places) for gap in (at + 2 * number, at + 2 * number + 1))
 
 
 def fit_at(profile: Profile, encoding: str, delimiter: str, lines: Sequence[HeadLine], at: int) -> Fit:
@@ -206,4 +278,8 @@ def _with_names(profile: Profile, encoding: str, delimiter: str, lines: Sequence
 
 
 def _names(line: str, delimiter: str, profile: Profile) -> tuple[str, ...]:
-    return tuple(split_cells(line.lstrip("#") if profile.header_tells else line, delimiter))
+    if profile.has_blanks:
+        line = line.strip()
+    if profile.header_tells:
+        line = line.lstrip("# \t" if profile.has_blanks else "#")
+    return tuple(split_cells(line, delimiter))

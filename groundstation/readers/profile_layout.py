@@ -7,6 +7,8 @@ import numpy as np
 
 from groundstation.base.records import Remark
 from groundstation.base.signals import field_of
+from groundstation.readers.conversions import number_of
+from groundstation.readers.dates import day_ns
 from groundstation.readers.dialect import uses_decimal_comma
 from groundstation.readers.layout import METHODS, Derivation, Key, LayoutRule, TableLayout, TimeRule, rule_for
 from groundstation.readers.norths import LOOKED_AT, OF_MOTION, Norths, by_motion, by_the_field, day_of, samples_of
@@ -53,7 +55,8 @@ def layout_of(
     derivations = [*fed.derivations, *_derivations(fit, fed)]
     rules = [*fed.rules.values(), *_raw(fit, fed.rules.values(), derivations, time)]
     decimal_comma = uses_decimal_comma(fit.first_rows, fit.delimiter)
-    return TableLayout(time, tuple(rules), tuple(derivations), decimal_comma), fed.remarks
+    texts = tuple(text for text in profile.missing if number_of(text) is None)
+    return TableLayout(time, tuple(rules), tuple(derivations), decimal_comma, missing=texts), fed.remarks
 
 
 def _with_nearest(fit: Fit, missing: Sequence[str]) -> str:
@@ -69,6 +72,7 @@ def _with_nearest(fit: Fit, missing: Sequence[str]) -> str:
 
 def _time(fit: Fit) -> TimeRule:
     time = fit.profile.time
+    day = day_ns(fit.metadata.get(time.date, ""), time.date_formats) if time.date else None
     names = tuple(name for name in time.columns if name in fit.position)
     return TimeRule(
         time.kind,  # type: ignore[arg-type]
@@ -76,6 +80,7 @@ def _time(fit: Fit) -> TimeRule:
         (", ".join(names),),
         *time.unit,
         date_formats=time.date_formats,
+        day_ns=day or 0,
     )
 
 
@@ -111,13 +116,13 @@ def _feed(fit: Fit, rule: ColumnRule, at: int, norths: Norths, fed: _Fed) -> Non
         text = f"{rule.name} counts from {north} north, by {by}"
         fed.remarks.append(Remark("north", text, rule.topic, (rule.field.name,)))
     if north != "magnetic":
-        fed.add(rule_for(at, rule.topic, rule.field, rule.factor, rule.offset, raw))
+        fed.add(_with_cells(rule_for(at, rule.topic, rule.field, rule.factor, rule.offset, raw), rule))
         return
     magnetic = field_of(rule.topic, "magnetic_heading_deg") if rule.field.name == "true_heading_deg" else None
     if magnetic is not None:
-        fed.add(rule_for(at, rule.topic, magnetic, rule.factor, rule.offset, raw))
+        fed.add(_with_cells(rule_for(at, rule.topic, magnetic, rule.factor, rule.offset, raw), rule))
     else:
-        fed.add(LayoutRule(at, *raw, "double", rule.factor, rule.offset))
+        fed.add(_with_cells(LayoutRule(at, *raw, "double", rule.factor, rule.offset), rule))
     variation = fit.profile.variation
     if variation is None or variation.column not in fit.position:
         if magnetic is None:
@@ -133,6 +138,11 @@ def _feed(fit: Fit, rule: ColumnRule, at: int, norths: Norths, fed: _Fed) -> Non
     factors, outputs = (1.0, sign * abs(variation.factor)), (rule.field.name,)
     not_zero = inputs[1:] if norths.has_variation else ()
     fed.derivations.append(Derivation("true_from_magnetic", rule.topic, outputs, inputs, factors, not_zero))
+
+
+def _with_cells(made: LayoutRule, rule: ColumnRule) -> LayoutRule:
+    """Return a rule of the layout with what the profile says of the cells."""
+    return replace(made, form=rule.form, values=rule.values, missing=rule.missing, part=rule.part)
 
 
 def _raw_key(fit: Fit, name: str) -> Key:

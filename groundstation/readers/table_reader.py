@@ -9,7 +9,6 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.csv as pa_csv
 
-from groundstation.base import arrow_values as arrow
 from groundstation.base.angles import wrap_360
 from groundstation.base.geodesy import NO_POSITION
 from groundstation.base.records import (
@@ -26,14 +25,14 @@ from groundstation.base.records import (
 )
 from groundstation.base.signals import kind_of
 from groundstation.readers import cells
-from groundstation.readers.cells import TableCells
-from groundstation.readers.dates import local_ns
+from groundstation.readers.conversions import read_cells
 from groundstation.readers.dialect import Dialect
 from groundstation.readers.inside import new_logs, with_own_zeros
 from groundstation.readers.layout import METHODS, Key, LayoutRule, TableLayout, apply
 from groundstation.readers.losses import Losses
 from groundstation.readers.places import PLACED, without_place, zeroed
-from groundstation.readers.rows import RowBlock, RowScanner, restore_delimiters
+from groundstation.readers.row_times import DayCount, times_of
+from groundstation.readers.rows import RowBlock, RowScanner
 from groundstation.readers.sections import TableSection
 from groundstation.readers.source import Source
 
@@ -48,6 +47,8 @@ class TableReader:
     source : Source
     sections : sequence of TableSection
         In the order of the file. Rules of kind ``raw`` are settled here by a first pass over the file.
+    losses : Losses, optional
+        What was lost before.
 
     Attributes
     ----------
@@ -55,14 +56,15 @@ class TableReader:
         Times read so far that name no zone.
     """
 
-    def __init__(self, source: Source, sections: Sequence[TableSection]) -> None:
+    def __init__(self, source: Source, sections: Sequence[TableSection], losses: Losses | None = None) -> None:
         self._source = source
-        self._losses = Losses()
+        self._losses = losses or Losses()
         self._wrapped: dict[str, int] = {}
         self.zoneless = 0
         self._placeless: set[str] = set()  # topics that had a row without a place
-        self._dialect, self._layout = sections[0].dialect, sections[0].layout
+        self._days = DayCount()
         self._sections = self._settled(sections)
+        self._dialect, self._layout = self._sections[0].dialect, self._sections[0].layout
 
     def items(self, header: LogHeader) -> Iterator[Item]:
         """Yield the header, batches in the order of the file, remarks and damage."""
@@ -70,7 +72,7 @@ class TableReader:
         lines: dict[int, str] = {}
         facts: dict[int, Mapping[str, str]] = {}
         for number, section in enumerate(self._sections):
-            self._dialect, self._layout = section.dialect, section.layout
+            self._dialect, self._layout, self._days = section.dialect, section.layout, DayCount()
             scanner = RowScanner(self._source, section.dialect, self._losses)
             zero_ns = _zero_of(header, section)
             for block in scanner:
@@ -122,12 +124,12 @@ class TableReader:
 
     def _texts(self, section: TableSection, columns: set[int]) -> set[int]:
         """Return those of some columns of a section that have a cell which is no number."""
-        self._dialect = section.dialect
+        self._dialect, self._layout = section.dialect, section.layout
         texts: set[int] = set()
         for block in RowScanner(self._source, section.dialect, Losses()) if columns else ():
             parsed = self._parse(block, dict.fromkeys(sorted(columns - texts), pa.string()))
             for column, array in parsed.items():
-                text = cells.trimmed(array)
+                text = self._cleaned(array)
                 if not cells.are_numbers(_with_point(text) if section.layout.decimal_comma else text):
                     texts.add(column)
             if texts == columns:
@@ -149,7 +151,7 @@ class TableReader:
             convert_options=pa_csv.ConvertOptions(
                 column_types={str(column): kind for column, kind in types.items()},
                 include_columns=[str(column) for column in types],
-                null_values=[""],
+                null_values=["", *self._layout.missing],
                 strings_can_be_null=True,
                 decimal_point=decimal_point,
             ),
@@ -166,13 +168,19 @@ class TableReader:
         As numbers where they can be, else as text.
         """
         layout = self._layout
-        types = {rule.column: pa.float64() if rule.kind == "double" else pa.string() for rule in layout.rules}
+        types = {rule.column: pa.float64() for rule in layout.rules}
+        types |= {rule.column: pa.string() for rule in layout.rules if not rule.is_parsed}
         types |= dict.fromkeys(layout.time.columns if with_time else (), pa.string())
         try:
             arrays = self._parse(block, types, "," if layout.decimal_comma else ".")
         except pa.ArrowInvalid:  # some cell is no number: take all as text and find out which
             arrays = self._parse(block, dict.fromkeys(types, pa.string()))
-        return {at: cells.trimmed(array) if pa.types.is_string(array.type) else array for at, array in arrays.items()}
+        return {at: self._cleaned(array) if pa.types.is_string(array.type) else array for at, array in arrays.items()}
+
+    def _cleaned(self, text: Any) -> Any:
+        """Trim cells; those that are empty, or mean no value in any column, become null."""
+        missing = self._layout.missing
+        return cells.without(cells.trimmed(text), missing) if missing else cells.trimmed(text)
 
     def _fields(self, arrays: Mapping[int, Any], lines: Int64Array) -> dict[Key, Column]:
         """Columns of the rules, and those that are derived from them."""
@@ -216,22 +224,15 @@ class TableReader:
         texts = [arrays[column] for column in rule.columns]
         if self._layout.decimal_comma:
             texts = [_with_point(text) for text in texts]
-        if rule.kind == "seconds":
-            read = cells.decimal_ns(texts[0], rule.digits, rule.multiple)
-        elif rule.kind == "nanoseconds":
-            read = cells.integers_ns(texts[0])
-        elif rule.kind == "iso":
-            read, zoneless = cells.iso_ns(texts[0])
-            self.zoneless += int(zoneless.sum())
-        else:
-            read = local_ns(texts[0], texts[1], texts[2] if len(texts) > 2 else None, rule.date_formats)
-            if len(texts) > 2:
-                self.zoneless += int(np.count_nonzero(read.column.mask & ~arrow.is_valid(texts[2])))
+        read, zoneless = times_of(rule, texts, self._days)
+        self.zoneless += zoneless
         self._losses.add("unreadable_cells", "times that cannot be read", lines[read.unreadable], where=rule.names[0])
         return read.column
 
     def _column(self, rule: LayoutRule, array: Any, lines: Int64Array) -> Column:
-        read, what = self._read_cells(rule, array)
+        if self._layout.decimal_comma and rule.kind == "double" and pa.types.is_string(array.type):
+            array = _with_point(array)
+        read, what = read_cells(rule, array, self._dialect.delimiter)
         self._losses.add("unreadable_cells", what, lines[read.unreadable], where=rule.target, topic=rule.topic)
         if read.cut is not None:
             what = f"texts cut to {MAX_TEXT_CHARACTERS} characters"
@@ -241,17 +242,6 @@ class TableReader:
             with np.errstate(over="ignore"):  # becomes infinite: the ledger flags it
                 column = Column(column.values * rule.factor + rule.offset, column.present)
         return self._on_the_circle(rule, column) if rule.is_heading else column
-
-    def _read_cells(self, rule: LayoutRule, array: Any) -> tuple[TableCells, str]:
-        if rule.kind == "bool":
-            return cells.flags(array), "cells that are not 0, 1, true or false"
-        if rule.kind == "text":
-            delimiter = self._dialect.delimiter
-            return cells.words(array, lambda word: restore_delimiters(word, delimiter)), "cells that are no text"
-        what = "cells that are not a number"
-        if not pa.types.is_string(array.type):
-            return cells.ready_numbers(array), what
-        return cells.numbers(_with_point(array) if self._layout.decimal_comma else array), what
 
     def _on_the_circle(self, rule: LayoutRule, column: Column) -> Column:
         """Bring headings into [0, 360).

@@ -37,6 +37,7 @@ FACTORS = {
     "deg": 1.0,
     "rad": 57.29577951308232,
     "arcmin": 1 / 60,
+    "arcsec": 1 / 3600,
     "deg1e7": 1e-7,
     "semicircle": 180.0,
     "m": 1.0,

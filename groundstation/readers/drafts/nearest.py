@@ -11,7 +11,7 @@ from groundstation.readers.drafts.words import meaning_of
 from groundstation.readers.profile import Profile
 from groundstation.readers.source import Source
 
-FEWEST_SHARED, LEAST_SHARE = 3, 0.3  # columns, and their share of those of the profile
+FEWEST_SHARED, LEAST_SHARE = 3, 0.5  # columns, and their share of those of the profile
 MOST_NAMED = 8
 _MOST_SEARCHED = 500  # names among which a similar one is looked for
 
@@ -62,7 +62,7 @@ def _nearest(sample: TableSample, profiles: Iterable[Profile]) -> str:
     """Name the profile that comes nearest, and what the table lacks of it."""
     there, best = {name.lower() for name in sample.names}, (0.0, "")
     for profile in profiles:
-        asked = dict.fromkeys((*profile.time.columns[:2], *profile.required))
+        asked = dict.fromkeys((*profile.time.asked, *profile.required))
         wanted = dict.fromkeys((*asked, *(rule.name for rule in profile.columns)))
         shared = sum(name.lower() in there for name in wanted)
         share = shared / max(1, len(wanted))
@@ -70,6 +70,7 @@ def _nearest(sample: TableSample, profiles: Iterable[Profile]) -> str:
             if not profile.first_lines:
                 asked |= dict.fromkeys(rule.name for rule in profile.columns if not rule.is_optional)
             missing = [name for name in asked if name.lower() not in there]
+            missing = missing or [rule.name for rule in profile.columns if rule.name.lower() not in there]
             lacks = f"it lacks {_listed(missing)}" if missing else "its first line is another"
             best = share, f"; nearest is profile {profile.name}: {lacks}"
     return best[1]
@@ -137,7 +138,7 @@ def why_no_header(source: Source, profile: Profile) -> str:
     if sample.header is None:
         return f"the table has no row of names: give them as recognise.names, {len(sample.names)} of them"
     targets = {rule.name: f"{rule.topic}.{rule.field.name}" for rule in profile.columns}
-    wanted = dict.fromkeys((*profile.required, *profile.time.columns[:2]))
+    wanted = dict.fromkeys((*profile.required, *profile.time.asked))
     told = []
     for name in wanted:
         if name not in sample.names:

@@ -1,0 +1,202 @@
+"""Tables with blanks between columns, or columns of fixed width, seen with tabs.
+
+A blank before each cell is shown as a tab, so every byte stays at its place: lines, their numbers and the bytes where
+they begin are those of the file. Where cells of fixed width touch, the lines are written anew into a temporary file.
+"""
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.base.records import BoolArray
+from groundstation.readers.compressed import FileWindow, unnamed_file
+from groundstation.readers.source import HEAD_BYTES, Source
+
+if TYPE_CHECKING:
+    from _typeshed import WriteableBuffer
+
+_BLANK, _TAB, _LF, _CR = 32, 9, 10, 13
+_BEFORE_BYTES = 1 << 16  # looked at before a place for the beginning of its line
+_PIECE_BYTES = 1 << 20
+
+
+@dataclass(frozen=True)
+class SpacedSource(Source):
+    """Another source with a tab before each cell.
+
+    Parameters
+    ----------
+    whole : Source
+    cells : int
+        Number of cells of a row in which cells belong together; 0: there are none.
+    joined : tuple of int
+        Gaps of such rows, counted from 0, that part no cells: ``47 00 12.5`` of degrees, minutes and seconds.
+    """
+
+    whole: Source
+    cells: int = 0
+    joined: tuple[int, ...] = ()
+
+    @cached_property
+    def size(self) -> int:
+        """Size in bytes."""
+        return self.whole.size
+
+    @property
+    def compression(self) -> str:
+        """Empty: what is read here is decompressed."""
+        return ""
+
+    @cached_property
+    def head(self) -> bytes:
+        """The first bytes, with tabs."""
+        head = self.whole.head
+        is_whole = len(head) < HEAD_BYTES
+        return tabbed(np.frombuffer(head + (b"\n" if is_whole else b""), np.uint8), self.cells, self.joined)[
+            : len(head)
+        ]
+
+    def open(self) -> BinaryIO:
+        """Open for reading bytes with tabs."""
+        return io.BufferedReader(_Tabs(self.whole.open(), self.cells, self.joined), _PIECE_BYTES)
+
+
+class _Tabs(io.RawIOBase):
+    """Bytes of a stream with a tab before each cell, from any place on."""
+
+    def __init__(self, stream: BinaryIO, cells: int, joined: tuple[int, ...]) -> None:
+        self._stream, self._cells, self._joined, self._at = stream, cells, joined, 0
+        self._from, self._ready = 0, b""  # whole lines that are converted, and where they begin
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def tell(self) -> int:
+        return self._at
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        base = {io.SEEK_SET: 0, io.SEEK_CUR: self._at}.get(whence)
+        self._at = max(0, (self._stream.seek(0, io.SEEK_END) if base is None else base) + offset)
+        return self._at
+
+    def close(self) -> None:
+        self._stream.close()
+        super().close()
+
+    def readinto(self, buffer: "WriteableBuffer") -> int:
+        view = memoryview(buffer).cast("B")
+        if not self._from <= self._at < self._from + len(self._ready):
+            self._convert()
+        begin = self._at - self._from
+        count = min(len(view), len(self._ready) - begin)
+        if count <= 0:
+            return 0
+        view[:count] = self._ready[begin : begin + count]
+        self._at += count
+        return count
+
+    def _convert(self) -> None:
+        """Convert the lines around the place that is asked for."""
+        is_next = self._at == self._from + len(self._ready)
+        start = self._at if is_next else max(0, self._at - _BEFORE_BYTES)
+        self._stream.seek(start)
+        data = self._stream.read(_PIECE_BYTES + self._at - start)
+        if not is_next and start:
+            line = max(data.rfind(b"\n", 0, self._at - start), data.rfind(b"\r", 0, self._at - start)) + 1
+            start, data = start + line, data[line:]
+        more = self._stream.read(1) if data else b""
+        if more:
+            end = max(data.rfind(b"\n"), data.rfind(b"\r")) + 1
+            data = data[:end] if end > self._at - start else data + more  # else a line longer than a piece
+        array = np.frombuffer(data if data[-1:] in (b"\n", b"\r") else data + b"\n", np.uint8)
+        self._from, self._ready = start, tabbed(array, self._cells, self._joined)[: len(data)]
+
+
+def tabbed(text: NDArray[np.uint8], cells: int = 0, joined: Sequence[int] = ()) -> bytes:
+    """Return lines with a tab for the last blank before each cell but the first.
+
+    Parameters
+    ----------
+    text : ndarray of uint8, shape (n,)
+        Lines, the last one ended.
+    cells, joined
+        As those of :class:`SpacedSource`.
+
+    Examples
+    --------
+    >>> line = np.frombuffer(b"  7  47 00 12.5   3 \\n", np.uint8)
+    >>> tabbed(line), tabbed(line, 5, (1, 2))
+    (b'  7 \\t47\\t00\\t12.5  \\t3 \\n', b'  7 \\t47 00 12.5  \\t3 \\n')
+    """
+    is_blank = (text == _BLANK) | (text == _TAB)
+    changes = np.flatnonzero(np.diff(is_blank, prepend=False, append=False))
+    first, begins = changes[::2], changes[1::2]  # of each run of blanks, and what stands behind it
+    is_inside = ~_ends_line(text[first - 1]) & ~_ends_line(text[np.minimum(begins, len(text) - 1)]) & (first > 0)
+    begins = begins[is_inside]
+    converted = np.where(is_blank, np.uint8(_BLANK), text)
+    converted[begins - 1] = _TAB
+    if joined and len(begins):
+        line = np.searchsorted(np.flatnonzero(_ends_line(text)), begins)
+        first = np.flatnonzero(np.append(True, line[1:] != line[:-1]))
+        counts = np.diff(np.append(first, len(begins)))
+        number = np.arange(len(begins)) - np.repeat(first, counts)
+        inside = (np.repeat(counts, counts) == cells - 1) & np.isin(number, joined)
+        converted[begins[inside] - 1] = _BLANK
+    return converted.tobytes()
+
+
+def _ends_line(characters: NDArray[np.uint8]) -> BoolArray:
+    return np.asarray((characters == _LF) | (characters == _CR))
+
+
+@dataclass(frozen=True)
+class FixedSource(Source):
+    """Another source whose columns have fixed widths, with a tab between the columns.
+
+    A line that is shorter than the columns has empty cells; what stands behind the last column belongs to it.
+    """
+
+    whole: Source
+    widths: tuple[int, ...]
+
+    @cached_property
+    def size(self) -> int:
+        """Size in bytes, tabs counted."""
+        return self._written[1]
+
+    @property
+    def compression(self) -> str:
+        """Empty: what is read here is decompressed."""
+        return ""
+
+    @cached_property
+    def head(self) -> bytes:
+        """The first bytes, with tabs."""
+        with self.open() as stream:
+            return stream.read(HEAD_BYTES)
+
+    def open(self) -> BinaryIO:
+        """Open for reading bytes with tabs."""
+        return io.BufferedReader(FileWindow(*self._written))
+
+    @cached_property
+    def _written(self) -> tuple[BinaryIO, int]:
+        file, size = unnamed_file(), 0
+        ends = np.cumsum(self.widths)[:-1].tolist()
+        with self.whole.open() as stream:
+            for line in iter(lambda: stream.readline(_PIECE_BYTES), b""):
+                content = line.rstrip(b"\r\n")
+                cells = [content[at:end] for at, end in zip((0, *ends), (*ends, None), strict=True)]
+                is_row = bool(content.strip()) and not content.startswith(b"#")
+                made = b"\t".join(cells) + line[len(content) :] if is_row else line
+                size += file.write(made)
+        file.flush()
+        return file, size

@@ -1,0 +1,208 @@
+"""Rows of several vehicles in one table, brought together vehicle by vehicle.
+
+The rows of a block are put in the order of their vehicles into a temporary file; the table is then read as if the rows
+of each vehicle stood together, the one that comes last in the file first: so its times lie before those above it, and
+each is a log of its own.
+"""
+
+import io
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pa_csv
+from numpy.typing import NDArray
+
+from groundstation.base import arrow_values as arrow
+from groundstation.base.records import BoolArray, Int64Array, Remark
+from groundstation.readers.cells import trimmed
+from groundstation.readers.compressed import unnamed_file
+from groundstation.readers.dialect import Dialect
+from groundstation.readers.losses import Losses
+from groundstation.readers.rows import RowBlock, RowScanner
+from groundstation.readers.sections import MOST, TableSection
+from groundstation.readers.source import HEAD_BYTES, Source
+
+if TYPE_CHECKING:
+    from _typeshed import WriteableBuffer
+
+_LF = 10
+
+
+@dataclass(frozen=True)
+class _Chunk:
+    """Rows of one vehicle that stand together in the temporary file."""
+
+    at: int
+    size: int
+    rows: int
+
+
+@dataclass(frozen=True)
+class GroupedSource(Source):
+    """Rows of a table, vehicle by vehicle."""
+
+    file: BinaryIO
+    chunks: tuple[_Chunk, ...]
+
+    @property
+    def size(self) -> int:
+        """Size in bytes."""
+        return sum(one.size for one in self.chunks)
+
+    @property
+    def compression(self) -> str:
+        """Empty."""
+        return ""
+
+    @property
+    def head(self) -> bytes:
+        """The first bytes."""
+        with self.open() as stream:
+            return stream.read(HEAD_BYTES)
+
+    def open(self) -> BinaryIO:
+        """Open the rows, from the first on."""
+        return io.BufferedReader(_Chunks(self.file, self.chunks))
+
+
+class _Chunks(io.RawIOBase):
+    """Pieces of a file in another order."""
+
+    def __init__(self, file: BinaryIO, chunks: Sequence[_Chunk]) -> None:
+        self._file, self._chunks, self._at = file, chunks, 0
+        self._ends = np.cumsum([one.size for one in chunks], dtype=np.int64)
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def tell(self) -> int:
+        return self._at
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        end = int(self._ends[-1]) if len(self._ends) else 0
+        self._at = max(0, {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: end}[whence] + offset)
+        return self._at
+
+    def readinto(self, buffer: "WriteableBuffer") -> int:
+        view = memoryview(buffer).cast("B")
+        number = int(np.searchsorted(self._ends, self._at, side="right"))
+        if number == len(self._chunks):
+            return 0
+        chunk = self._chunks[number]
+        left = int(self._ends[number]) - self._at
+        self._file.seek(chunk.at + chunk.size - left)
+        data = self._file.read(min(left, len(view)))
+        view[: len(data)] = data
+        self._at += len(data)
+        return len(data)
+
+
+@dataclass(frozen=True)
+class Vehicles:
+    """Table of several vehicles: its source, a section for each, and a remark on them."""
+
+    source: Source
+    sections: tuple[TableSection, ...]
+    remark: Remark
+
+
+def by_vehicle(
+    source: Source, section: TableSection, column: int, name: str, only: Sequence[str], losses: Losses
+) -> Vehicles | None:
+    """Bring the rows of each vehicle together.
+
+    Parameters
+    ----------
+    source : Source
+    section : TableSection
+        All rows of the table.
+    column : int
+        The one that tells the vehicle.
+    name : str
+        Its name.
+    only : sequence of str
+        Vehicles that are read; all where it is empty.
+    losses : Losses
+        Takes what is lost.
+
+    Returns
+    -------
+    Vehicles or None
+        None where no row tells its vehicle.
+    """
+    file, chunks, at = unnamed_file(), dict[str, list[_Chunk]](), 0
+    for block in RowScanner(source, section.dialect, losses):
+        for key, rows, lines in _parted(block, section.dialect, column):
+            if not key:
+                losses.add("dropped_rows", f"rows without a {name}", lines)
+            elif not only or key in only:
+                chunks.setdefault(key, []).append(_Chunk(at, len(rows), len(lines)))
+                at += file.write(rows)
+    file.flush()
+    counts = {key: sum(one.rows for one in several) for key, several in chunks.items()}
+    most = set(sorted(counts, key=lambda key: -counts[key])[:MOST])
+    if not most:
+        return None
+    left = sum(count for key, count in counts.items() if key not in most)
+    if left:
+        lines = np.full(left, section.dialect.first_line, dtype=np.int64)
+        losses.add("dropped_rows", f"rows of vehicles beyond the {MOST} with the most rows", lines)
+    kept = [key for key in reversed(chunks) if key in most]
+    sections, first_byte, first_line = list[TableSection](), 0, section.dialect.first_line
+    for key in kept:
+        end_byte = first_byte + sum(one.size for one in chunks[key])
+        dialect = Dialect("utf-8", section.dialect.delimiter, section.dialect.cells, first_byte, first_line)
+        facts = {**section.facts, "aircraft": key}
+        sections.append(replace(section, dialect=replace(dialect, end_byte=end_byte), facts=facts))
+        first_byte, first_line = end_byte, first_line + counts[key] + 1  # a place for the log that begins there
+    text = f"{len(kept)} vehicles by {name}, a log each; records are numbered vehicle by vehicle, the last one first"
+    found = GroupedSource(source.path, file, tuple(one for key in kept for one in chunks[key]))
+    return Vehicles(found, tuple(sections), Remark("vehicles", text))
+
+
+def _parted(block: RowBlock, dialect: Dialect, column: int) -> Iterator[tuple[str, bytes, Int64Array]]:
+    """Yield the rows of each vehicle in a block, with their line numbers.
+
+    Its name is empty where none is told.
+    """
+    keys = _keys(block, dialect, column).dictionary_encode(null_encoding="encode")
+    codes = arrow.values(keys.indices, 0).astype(np.int64)
+    text = np.frombuffer(block.text, dtype=np.uint8)
+    ends = np.flatnonzero(text == _LF) + 1
+    starts = np.concatenate(([0], ends[:-1]))
+    names = [word or "" for word in keys.dictionary.to_pylist()]
+    for code in dict.fromkeys(codes.tolist()):
+        is_own = codes == code
+        yield names[code], _rows(text, starts, ends, is_own), block.line_numbers[is_own]
+
+
+def _rows(text: NDArray[np.uint8], starts: Int64Array, ends: Int64Array, wanted: BoolArray) -> bytes:
+    """Return some of the rows of a text."""
+    changes = np.flatnonzero(np.diff(wanted, prepend=False, append=False))
+    return b"".join(
+        text[starts[first] : ends[last - 1]].tobytes() for first, last in zip(changes[::2], changes[1::2], strict=True)
+    )
+
+
+def _keys(block: RowBlock, dialect: Dialect, column: int) -> Any:
+    names = [str(number) for number in range(dialect.cells)]
+    table = pa_csv.read_csv(
+        pa.BufferReader(block.text),
+        read_options=pa_csv.ReadOptions(column_names=names, use_threads=False, block_size=len(block.text) + 1),
+        parse_options=pa_csv.ParseOptions(
+            delimiter=dialect.delimiter, quote_char=False, escape_char=False, ignore_empty_lines=False
+        ),
+        convert_options=pa_csv.ConvertOptions(
+            column_types={str(column): pa.string()},
+            include_columns=[str(column)],
+            null_values=[""],
+            strings_can_be_null=True,
+        ),
+    )
+    return trimmed(table.column(str(column)).combine_chunks())
