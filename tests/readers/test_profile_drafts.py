@@ -147,6 +147,39 @@ def test_date_and_time_of_day_in_two_columns(write: Write) -> None:
     assert '"%d.%m.%Y"' in toml
 
 
+def test_utc_in_whole_seconds_beside_a_counter(write: Write) -> None:
+    head = "time(millisecond),datetime(utc),latitude,longitude,speed(mph),compass_heading(degrees)\n"
+    rows = "".join(
+        f"{int(t * 1000)},2026-07-14 11:45:{int(t):02d},{lat:.7f},{lon:.7f},{SPEED_MPS / 0.44704:.4f},{track:.1f}\n"
+        for t, lat, lon, track in circle(100)
+    )
+    profile, text = drafted(write("air.csv", head + rows))
+    assert 'kind = "utc_counter"' in text
+    read = Read(profile.with_suffix(".csv"), profile)
+    times = read.times("gnss")
+    assert times[5] - times[4] == 500_000_000 and read.header.utc_of_zero_ns is not None
+    assert read.values("gnss", "ground_speed_mps")[9] == pytest.approx(SPEED_MPS, rel=1e-4)
+
+
+def test_gps_week_blanks_degrees_and_minutes_and_signs_for_no_value(write: Write) -> None:
+    rows = "".join(f"2300 {100000 + t} 50:00:{t:04.1f}N 30:30:00E {'-' if t % 2 else 5 + t}\n" for t in range(20))
+    profile, text = drafted(write("week.txt", "Week TOW Lat Lon Speed_kt\n" + rows))
+    assert 'kind = "gps_week"' in text and 'delimiter = "blanks"' in text and 'missing = ["-"]' in text
+    read = Read(profile.with_suffix(".txt"), profile)
+    assert read.values("gnss", "latitude_deg")[1] == pytest.approx(50 + 1 / 3600)
+    assert read.values("gnss", "longitude_deg")[0] == 30.5
+    assert read.times("gnss")[1] - read.times("gnss")[0] == 1_000_000_000
+
+
+def test_several_vehicles_in_one_table(write: Write) -> None:
+    rows = "".join(
+        f"{1_700_000_000 + t},{name},50.{t:02d},30.0,100\n" for t in range(20) for name in ("4b1814", "4b1815")
+    )
+    profile, text = drafted(write("a.csv", "time,icao24,lat,lon,velocity\n" + rows))
+    assert "[key]" in text and 'column = "icao24"' in text and 'kind = "unix"' in text
+    assert len(Read(profile.with_suffix(".csv"), profile).values("gnss", "latitude_deg")) == 40
+
+
 @pytest.mark.parametrize(
     ("name", "target", "unit"),
     [

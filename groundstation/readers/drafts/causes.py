@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable, Sequence
 
 _SHARE = 0.5  # of the cells, which have one cause
+_NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?")
 _DATE = re.compile(r"(\d{1,2})[/.-](\d{1,2})[/.-](\d{4}|\d\d)(?!\d)")
 _EXCEL = re.compile(r"\d{1,2}:\d\d[.,]\d{1,3}")
 _CLOCK = re.compile(r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d*)?)?(?: ?[AaPp]\.?[Mm]\.?)?")
@@ -15,7 +16,7 @@ _DMS = re.compile(
 )
 _SIDE = re.compile(r"[NSEWnsew]\s*\d+(?:\.\d*)?|\d+(?:\.\d*)?\s*°?\s*[NSEWnsew]")
 _WITH_UNIT = re.compile(r"[+-]?\d+(?:\.\d*)?\s*[A-Za-z°%/²]+[A-Za-z0-9/^²]*")
-_MISSING = frozenset(
+MISSING = frozenset(
     ("n/a", "na", "null", "none", "nil", "-", "--", "---", "*", "?", "inv", "invalid", "no data", "#n/a")
 )
 
@@ -35,6 +36,17 @@ def date_order(cells: Sequence[str]) -> str:
     if max(firsts) > 12:
         return "day/month" if max(seconds) <= 12 else ""
     return "month/day" if max(seconds) > 12 else "unclear"
+
+
+def are_angles(cells: Sequence[str]) -> bool:
+    """Tell whether cells are degrees, minutes and seconds.
+
+    Examples
+    --------
+    >>> are_angles(["47:12:36.0", "12°30′18″S"]), are_angles(["47.5"])
+    (True, False)
+    """
+    return bool(cells) and all(_DMS.fullmatch(cell.strip()) and not _NUMBER.fullmatch(cell) for cell in cells)
 
 
 def cause_of_times(cells: Sequence[str]) -> str:
@@ -89,7 +101,7 @@ def cause_of_numbers(cells: Sequence[str], delimiter: str) -> str:
     if not odd:
         return ""
     example = repr(odd[0][:40])
-    missing = [cell for cell in odd if cell.lower() in _MISSING]
+    missing = [cell for cell in odd if cell.lower() in MISSING]
     if len(missing) >= _SHARE * len(odd):
         return f"a sign for a missing value, {missing[0]!r}"
     if _most(odd, _COMMA.fullmatch) and delimiter == ",":

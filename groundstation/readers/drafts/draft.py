@@ -16,7 +16,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.signals import Field, field_of
 from groundstation.base.toml_text import quoted
 from groundstation.base.units import CONVERSIONS
-from groundstation.readers.drafts.causes import cause_of_numbers
+from groundstation.readers.drafts.causes import are_angles, cause_of_numbers
 from groundstation.readers.drafts.motion import Motion, motion_of
 from groundstation.readers.drafts.sample import TableSample, sample_of
 from groundstation.readers.drafts.times import TimeGuess, time_of
@@ -179,6 +179,8 @@ class _Guesses:
         if known.kind == "bool":
             is_flag = {cell.lower() for cell in sample.filled(at)} <= _FLAGS
             return replace(left, target=meaning.target) if is_flag else left
+        if known.unit == "deg" and are_angles(sample.filled(at)):
+            return replace(left, target=meaning.target, sign=meaning.sign, unit="dms")
         if not sample.is_of_numbers(at):
             cause = cause_of_numbers(sample.filled(at), sample.delimiter)
             return replace(left, doubt=f"looks like {meaning.target}, but has {cause}" if cause else "")
@@ -397,13 +399,14 @@ def _text(sample: TableSample, time: TimeGuess, columns: Sequence[ColumnGuess]) 
             "# Look at each line with a question mark.",
             "# docs/profiles.md has every key; `groundstation profile check` shows what each column becomes.",
             f"name = {quoted(_name_of(sample.name))}",
+            *_signs(sample, used),
             "",
             *_recognise(sample, time, used),
             "",
             *(f"# ? {time.doubt}" for _ in range(bool(time.doubt))),
             f"[time]  # {_comment(time.why)}",
             *time.lines,
-            *(("", "[metadata.set]", f"start_utc = {quoted(time.start_utc)}") if time.start_utc else ()),
+            *_key(sample),
             *_variation(sample, used),
             "",
             "[columns]",
@@ -425,10 +428,31 @@ def _recognise(sample: TableSample, time: TimeGuess, used: Sequence[ColumnGuess]
     needed = (places or [one.name for one in used])[:_MOST_REQUIRED]
     names = [*(sample.names[at] for at in time.columns[:2]), *needed]
     yield f"columns = [{', '.join(map(quoted, dict.fromkeys(names)))}]"
+    if sample.is_spaced:
+        yield 'delimiter = "blanks"'
     if sample.behind:
         yield f"rows_after_header = {len(sample.behind)}"
     if sample.header.text.startswith("#"):
         yield "header_tells = true"
+
+
+def _key(sample: TableSample) -> Iterator[str]:
+    """Yield the column that tells several vehicles apart."""
+    for at, meaning in enumerate(sample.meanings):
+        if meaning is not None and meaning.role == "key" and len(set(sample.filled(at))) > 1:
+            yield from (
+                "",
+                "[key]  # ? several vehicles, each a flight of its own",
+                f"column = {quoted(sample.names[at])}",
+            )
+            return
+
+
+def _signs(sample: TableSample, used: Sequence[ColumnGuess]) -> Iterator[str]:
+    """Yield the signs for missing values in the columns that become fields."""
+    found = sorted({sign for one in used for sign in sample.signs(one.at)})
+    if found:
+        yield f"missing = [{', '.join(map(quoted, found))}]"
 
 
 def _variation(sample: TableSample, used: Sequence[ColumnGuess]) -> Iterator[str]:

@@ -11,7 +11,7 @@ from groundstation.readers.drafts.words import meaning_of
 from groundstation.readers.profile import Profile
 from groundstation.readers.source import Source
 
-FEWEST_SHARED, LEAST_SHARE = 3, 0.5  # columns, and their share of those of the profile
+FEWEST_SHARED, LEAST_SHARE = 4, 0.5  # columns, one fewer of others' profiles, and their share of those of the profile
 MOST_NAMED = 8
 _MOST_SEARCHED = 500  # names among which a similar one is looked for
 
@@ -66,7 +66,7 @@ def _nearest(sample: TableSample, profiles: Iterable[Profile]) -> str:
         wanted = dict.fromkeys((*asked, *(rule.name for rule in profile.columns)))
         shared = sum(name.lower() in there for name in wanted)
         share = shared / max(1, len(wanted))
-        if shared >= FEWEST_SHARED and share >= LEAST_SHARE and share > best[0]:
+        if shared >= FEWEST_SHARED - (not profile.first_lines) and share >= LEAST_SHARE and share > best[0]:
             if not profile.first_lines:
                 asked |= dict.fromkeys(rule.name for rule in profile.columns if not rule.is_optional)
             missing = [name for name in asked if name.lower() not in there]
@@ -83,7 +83,7 @@ def _canonical(sample: TableSample, time: TimeGuess) -> list[str]:
     kind = time.lines[0].partition('"')[2].rstrip('"')
     of_time = {"iso": "time_utc", "seconds": "time_s", "nanoseconds": "time_ns"}.get(kind)
     is_other_unit = kind == "seconds" and 'unit = "s"' not in time.lines
-    if of_time is None or time.start_utc or is_other_unit:
+    if of_time is None or is_other_unit:
         return []
     names = []
     for at, meaning in enumerate(sample.meanings):

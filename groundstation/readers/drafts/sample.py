@@ -18,9 +18,11 @@ from groundstation.readers.dialect import (
     split_cells,
     uses_decimal_comma,
 )
+from groundstation.readers.drafts.causes import MISSING
 from groundstation.readers.drafts.words import Meaning, meaning_of
 from groundstation.readers.magic import is_binary, is_wide_text
 from groundstation.readers.source import Source
+from groundstation.readers.spaced import SpacedSource
 
 _NUMBER = re.compile(r"[+-]{0,2}(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?|nan|NaN|NAN|[+-]?inf")
 _TIME = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}.*|\d{1,2}:\d\d(?::\d\d)?(?:[.,]\d*)?(?: ?[AaPp][Mm])?")
@@ -46,6 +48,8 @@ class TableSample:
         Cells of the rows between the header and the data: units, other names.
     blocks : tuple of tuple of tuple of str
         Rows that follow one another, piece by piece; each has as many cells as there are names.
+    is_spaced : bool
+        Blanks part the cells; they are seen as tabs.
     """
 
     name: str
@@ -55,6 +59,7 @@ class TableSample:
     names: tuple[str, ...]
     behind: tuple[tuple[str, ...], ...]
     blocks: tuple[tuple[tuple[str, ...], ...], ...]
+    is_spaced: bool = False
     _numbers: dict[int, FloatArray] = field(default_factory=dict)
 
     @cached_property
@@ -94,12 +99,16 @@ class TableSample:
             return np.nan
 
     def filled(self, at: int) -> list[str]:
-        """Return the cells of a column that are not empty."""
-        return [cell for cell in self.columns[at] if cell]
+        """Return the cells of a column that are neither empty nor a sign for that."""
+        return [cell for cell in self.columns[at] if cell and cell.lower() not in MISSING]
+
+    def signs(self, at: int) -> set[str]:
+        """Return the signs for missing values in a column."""
+        return {cell for cell in self.columns[at] if cell.lower() in MISSING}
 
     def is_of_numbers(self, at: int) -> bool:
         """Tell whether a column is one of numbers."""
-        filled = sum(map(bool, self.columns[at]))
+        filled = len(self.filled(at))
         found = int(np.count_nonzero(np.isfinite(self.numbers(at))))
         return filled > 0 and found >= ENOUGH * filled
 
@@ -128,14 +137,28 @@ def sample_of(source: Source) -> TableSample:
         raise UnreadableLogError(source.name, "binary data", "a table of text", "export the log as CSV")
     lines = head_lines(source, encoding, _FIRST_LINES)
     shapes = [found for delimiter in DELIMITERS if (found := _Shape.of(lines, delimiter)) is not None]
+    is_spaced = not any(one.first_row is not None for one in shapes)
+    if is_spaced and (spaced := _spaced(source, encoding)) is not None:
+        source, lines, shape = spaced
+        return _sample(source, encoding, lines, shape, is_spaced=True)
     if not shapes:
         raise UnreadableLogError(
-            source.name, "no table", "a row of names and rows of as many cells, parted by comma, semicolon or tab"
+            source.name,
+            "no table",
+            "a row of names and rows of as many cells, parted by comma, semicolon, tab or blanks",
         )
     shape = max(shapes, key=lambda one: (one.first_row is not None and one.header is not None, one.share, one.cells))
     if shape.first_row is None:
         raise UnreadableLogError(source.name, "names but no rows of numbers below", "a header and rows")
     return _sample(source, encoding, lines, shape)
+
+
+def _spaced(source: Source, encoding: str) -> "tuple[Source, list[HeadLine], _Shape] | None":
+    """Return a table whose cells are parted by blanks, with tabs for them; None where it is none."""
+    seen = SpacedSource(source.path, source)
+    lines = head_lines(seen, encoding, _FIRST_LINES)
+    shape = _Shape.of(lines, "\t")
+    return None if shape is None or shape.first_row is None or shape.share < ENOUGH / 2 else (seen, lines, shape)
 
 
 @dataclass(frozen=True)
@@ -187,7 +210,9 @@ def _known_names(row: Sequence[str]) -> int:
     return len({one.target or one.role for one in found if one is not None})
 
 
-def _sample(source: Source, encoding: str, lines: Sequence[HeadLine], shape: _Shape) -> TableSample:
+def _sample(
+    source: Source, encoding: str, lines: Sequence[HeadLine], shape: _Shape, *, is_spaced: bool = False
+) -> TableSample:
     header = None if shape.header is None else lines[shape.header]
     assert shape.first_row is not None
     behind: tuple[tuple[str, ...], ...] = ()
@@ -205,7 +230,7 @@ def _sample(source: Source, encoding: str, lines: Sequence[HeadLine], shape: _Sh
     kept = tuple(block for block in blocks if block)
     if not kept:
         raise UnreadableLogError(source.name, "names but no rows below", "a header and rows")
-    return TableSample(source.name, encoding, shape.delimiter, header, names, behind, kept)
+    return TableSample(source.name, encoding, shape.delimiter, header, names, behind, kept, is_spaced)
 
 
 def _rows(texts: Iterator[str] | Sequence[str], delimiter: str, count: int, most: int) -> Iterator[tuple[str, ...]]:

@@ -21,15 +21,15 @@ _RISING = 0.98  # share of the steps that do not go back
 _SINCE_1970 = {"s": (8e8, 4e9), "ms": (8e11, 4e12), "us": (8e14, 4e15), "ns": (8e17, 4e18)}
 SECONDS = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
 _PRIME = 0.9  # share of rows with a time of their own
-_OF_EPOCH = "1970-01-01T00:00:00Z"
+_WEEK_S = 604_800.0
 
 
 @dataclass(frozen=True)
 class TimeGuess:
     """Time of the rows: the columns, the lines of ``[time]``, why.
 
-    ``seconds`` are the times of the rows of the sample, NaN where there are none; ``start_utc`` is the UTC of time
-    zero where the column counts from 1970. ``doubt``: what the user has to look at.
+    ``seconds`` are the times of the rows of the sample, NaN where there are none. ``doubt``: what the user has to look
+    at.
     """
 
     columns: tuple[int, ...]
@@ -37,7 +37,6 @@ class TimeGuess:
     why: str
     seconds: FloatArray
     is_absolute: bool
-    start_utc: str = ""
     doubt: str = ""
     rank: int = 0
 
@@ -58,11 +57,53 @@ def time_of(sample: TableSample) -> TimeGuess:
     UnreadableLogError
         When no column is a time; the cause is named where it is known.
     """
-    found = [*_of_iso(sample), *_of_local(sample), *_of_numbers(sample)]
+    found = [*_of_iso(sample), *_of_local(sample), *_of_week(sample), *_of_numbers(sample)]
     if not found:
         raise UnreadableLogError(sample.name, *_no_time(sample))
+    found += [*_of_both(sample, found)]
     fine = [one for one in found if one.own >= _PRIME] or found
     return max(fine, key=lambda one: (one.is_absolute, one.rank, one.own))
+
+
+def _of_both(sample: TableSample, found: list[TimeGuess]) -> Iterator[TimeGuess]:
+    """Yield UTC in whole seconds together with a counter that tells the rows apart."""
+    utc = next((one for one in found if one.is_absolute and one.own < _PRIME), None)
+    counter = next((one for one in found if not one.is_absolute and one.own >= _PRIME), None)
+    if utc is None or counter is None or any(one.is_absolute and one.own >= _PRIME for one in found):
+        return
+    of_utc = [line.replace("column =", "utc =") for line in utc.lines[1:] if not line.startswith("offset")]
+    of_counter = [line.replace("column =", "counter =") for line in counter.lines[1:]]
+    yield TimeGuess(
+        (*counter.columns, *utc.columns),
+        ('kind = "utc_counter"', *of_counter, *of_utc),
+        f"{utc.why}, in whole seconds, beside a counter",
+        counter.seconds,
+        True,
+        "; ".join(filter(None, (utc.doubt, counter.doubt))),
+        counter.rank + 1,
+    )
+
+
+def _of_week(sample: TableSample) -> Iterator[TimeGuess]:
+    """Yield GPS week and seconds of the week."""
+    by_role = {one.role: at for at, one in reversed(list(enumerate(sample.meanings))) if one is not None and one.role}
+    if not {"week", "tow"} <= by_role.keys():
+        return
+    week, tow = by_role["week"], by_role["tow"]
+    seconds, weeks = sample.numbers(tow), sample.numbers(week)
+    if not (sample.is_of_numbers(tow) and sample.is_of_numbers(week)):
+        return
+    unit = "ms" if np.nanmax(seconds) > 2 * _WEEK_S else "s"
+    seconds = seconds * SECONDS[unit] + weeks * _WEEK_S
+    if _rises(seconds) and np.nanmax(seconds) > np.nanmin(seconds):
+        lines = (
+            'kind = "gps_week"',
+            f"week = {quoted(sample.names[week])}",
+            f"seconds = {quoted(sample.names[tow])}",
+            f'unit = "{unit}"',
+        )
+        doubt = "weeks below 1024 have rolled over: see earliest_year" if np.nanmax(weeks) < 1024 else ""
+        yield TimeGuess((week, tow), lines, "GPS week and seconds of the week", seconds, True, doubt, 3)
 
 
 def _no_time(sample: TableSample) -> tuple[str, str, str]:
@@ -202,10 +243,9 @@ def _of_numbers(sample: TableSample) -> Iterator[TimeGuess]:
         )
         if since and "gps" in name.lower() and unit == "s" and middle < 1.5e9:
             doubt = "seconds since 1970 assumed: GPS seconds count from 1980 and differ by leap seconds"
-        kind = "nanoseconds" if unit == "ns" and since else "seconds"
-        lines = (f'kind = "{kind}"', f"column = {quoted(name)}", *((f'unit = "{unit}"',) if kind == "seconds" else ()))
+        lines = (f'kind = "{"unix" if since else "seconds"}"', f"column = {quoted(name)}", f'unit = "{unit}"')
         rank = _rank(sample, at) + (0 if is_named else -2)
-        yield TimeGuess((at,), lines, why, values * SECONDS[unit], bool(since), _OF_EPOCH if since else "", doubt, rank)
+        yield TimeGuess((at,), lines, why, values * SECONDS[unit], bool(since), doubt, rank)
 
 
 def _rank(sample: TableSample, at: int) -> int:
