@@ -49,3 +49,16 @@ def toml_table(text: str, where: str, expected: str = "a TOML file", next_step: 
         raise SettingsError(where, f"not TOML ({error})", expected, next_step) from error
     except RecursionError as error:
         raise SettingsError(where, "not TOML (brackets in brackets, too many)", expected, next_step) from error
+
+
+def quoted(text: str) -> str:
+    """Return a text as TOML writes it, between quotes.
+
+    Examples
+    --------
+    >>> print(quoted('Speed "GPS" \\u00b5\\x7f'))
+    "Speed \\"GPS\\" µ\\u007f"
+    """
+    import json
+
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -19,7 +19,15 @@ TOPIC_CODES = (
 WHOLE_SHARE = 0.9  # of the time: increments that cover less have gaps, or were thinned out
 _REMARKS_THAT_WARN = (
     *("assumed_utc", "assumed_year", "year_unknown", "clock_disagrees", "unreadable_metadata"),
-    *("plug_in", "duplicate_column", "icd_of_another", "tmats_contradicted", "week_rollover", "week_number"),
+    *(
+        "plug_in",
+        "duplicate_column",
+        "missing_columns",
+        "icd_of_another",
+        "tmats_contradicted",
+        "week_rollover",
+        "week_number",
+    ),
 )
 
 

@@ -33,6 +33,7 @@ _DMS = (
     r"(?P<minutes>\d{1,2}(?:\.\d*)?)(?:\s*[:'′m]\s*|\s+|$)"
     r"(?P<seconds>(?:\d{1,2}(?:\.\d*)?)?)\s*[\"″s]?\s*(?P<behind>[NSEWnsew]?)\s*$"
 )
+_SLASHED = re.compile(r"\d{4}[/.]\d{1,2}[/.]\d{1,2}\b")
 _TWO_SIGNS = r"^\+-"  # a Garmin G5 writes its plus in front of every number
 _NOT_TEXT = r"[\x00-\x08\x0a-\x1e\x7f\x{FFFD}]"
 
@@ -302,12 +303,15 @@ def _times(values: Int64Array, filled: BoolArray, readable: BoolArray) -> TableC
 def iso_ns(text: Any) -> tuple[TableCells, BoolArray]:
     """ISO 8601 times as UTC nanoseconds since 1970, and where no zone was named (read as UTC).
 
+    Slashes or points may part the date: 2026/05/04 06:00:01.
+
     Examples
     --------
     >>> cells, zoneless = iso_ns(pa.array(["2026-05-04T06:00:00.25Z", "2026-05-04 06:00:01", "later"]))
     >>> cells.column.values.tolist(), zoneless.tolist()
     ([1777874400250000000, 1777874401000000000, 0], [False, True, False])
     """
+    text = _dashed(text)
     for target, zoneless in ((pa.timestamp("ns", tz="UTC"), False), (pa.timestamp("ns"), True)):
         try:
             whole = pc.cast(pc.cast(text, target), pa.int64())
@@ -317,6 +321,15 @@ def iso_ns(text: Any) -> tuple[TableCells, BoolArray]:
         read = _times(arrow.values(whole, 0), filled, filled)
         return read, read.column.mask & zoneless
     return _iso_one_by_one(text)
+
+
+def _dashed(text: Any) -> Any:
+    """Return times whose dates have dashes: 2026-05-04 of 2026/05/04 or 2026.5.4."""
+    first = next((cell for cell in text[:100].to_pylist() if cell), "")
+    if not _SLASHED.match(first):
+        return text
+    text = pc.replace_substring_regex(text, r"^(\d{4})[/.](\d{1,2})[/.](\d{1,2})\b", r"\1-0\2-0\3")
+    return pc.replace_substring_regex(text, r"^(\d{4})-0?(\d\d)-0?(\d\d)\b", r"\1-\2-\3")
 
 
 def _iso_one_by_one(text: Any) -> tuple[TableCells, BoolArray]:

@@ -18,11 +18,14 @@ from groundstation.base.records import Damage, Item, LogHeader, RecordBatch, Rem
 from groundstation.base.slips import slips
 from groundstation.readers.days import day_ns
 from groundstation.readers.dialect import Dialect, HeadLine, detect_encoding, head_lines
+from groundstation.readers.drafts.reasons import with_reasons
+from groundstation.readers.layout import TableLayout
 from groundstation.readers.losses import Losses
 from groundstation.readers.misnamed import misnamed
 from groundstation.readers.profile import Profile, load, shipped
 from groundstation.readers.profile_fit import Fit, delimiter_of, delimiters_of, fit_at, fit_below, joined_gaps
 from groundstation.readers.profile_layout import layout_of
+from groundstation.readers.profile_sources import other_profiles
 from groundstation.readers.rtklib_tag import TaggedClock, clock_by_tag
 from groundstation.readers.sections import MOST, TableSection, header_places, left_out, mark_of, told
 from groundstation.readers.source import Claim, Source
@@ -43,8 +46,11 @@ if TYPE_CHECKING:
 
 
 @cache
-def _shipped() -> tuple[Profile, ...]:
-    return shipped()
+def known_profiles() -> tuple[Profile, ...]:
+    """List the profiles that are tried on every table: those of others before ours."""
+    others = other_profiles().profiles
+    taken = {profile.name for profile in others}
+    return (*others, *(profile for profile in shipped() if profile.name not in taken))
 
 
 def sniff(source: Source) -> Claim | None:
@@ -61,9 +67,10 @@ def sniff(source: Source) -> Claim | None:
 def _best(source: Source) -> tuple[float, Fit] | None:
     """Return the shipped profile that fits a file, and how sure that is."""
     first = source.head[:4096].removeprefix(b"\xef\xbb\xbf").decode("utf-8", errors="replace").lstrip()
-    profiles = [profile for profile in _shipped() if profile.first_lines]
+    others = set(map(id, other_profiles().profiles))
+    profiles = [profile for profile in known_profiles() if profile.first_lines or id(profile) in others]
     row = _COMMENTS.sub("", first)  # the first line that is none of the metadata above a header
-    is_one = any(first.startswith(profile.first_lines) for profile in profiles)
+    is_one = any(first.startswith(profile.first_lines) for profile in profiles if profile.first_lines)
     encoding = detect_encoding(source.head, source.name)
     below = (
         {profile.name for profile in profiles if _stands_below(source, profile)} if _begins_with_rows(source) else set()
@@ -79,6 +86,10 @@ def _best(source: Source) -> tuple[float, Fit] | None:
         if is_near and not any(all(name in line.text for name in profile.required) for line in near):
             continue
         seen = head_lines(_seen(source, profile), encoding, most) if profile.is_spaced else lines
+        if not profile.first_lines:
+            fit = _named_by(profile, encoding, seen)
+            found += [(1.0, fit)] if fit is not None else []
+            continue
         if profile.names:
             fit = _without_header(profile, encoding, seen) if is_its_own else None
         else:
@@ -92,6 +103,14 @@ def _best(source: Source) -> tuple[float, Fit] | None:
         if best is not None and one[1].header in best[1].behind and one[1].told_count > best[1].told_count:
             return one
     return best
+
+
+def _named_by(profile: Profile, encoding: str, lines: Sequence[HeadLine]) -> Fit | None:
+    """Match a profile without a first line to a table that has all columns it needs."""
+    fit = None if profile.names else _fit(profile, encoding, lines)
+    wanted = [rule.name for rule in profile.columns if not rule.is_optional]
+    is_all = fit is not None and all(name in fit.position for name in wanted)
+    return fit if is_all and len({*wanted, *profile.required}) >= DISTINCTIVE_COLUMNS - 1 else None
 
 
 def _begins_with_rows(source: Source) -> bool:
@@ -167,7 +186,11 @@ def _items(whole: Source, fit: Fit) -> Iterator[Item]:
     yield next(items)
     yield from dict.fromkeys([*remarks, *clock_remarks, *section_remarks, *unusable_references(fit.metadata)])
     yield from () if above else _above(fit)
-    for item in misnamed(items, _slips(fit), fit.header.number):
+    time = ", ".join(name for name in fit.profile.time.columns if name in fit.position)
+    places = {f"{rule.topic}.{rule.field.name}": rule.name for rule in fit.profile.columns} | {
+        time: fit.profile.time.columns[0]
+    }
+    for item in with_reasons(misnamed(items, _slips(fit), fit.header.number), source, places, time):
         yield item if clock is None or not isinstance(item, RecordBatch) else _undrifted(item, clock)
 
 
@@ -257,13 +280,13 @@ def _fitted(source: Source, profile: Profile) -> Fit:
         return found
     fit = _fit(profile, encoding, head_lines(_seen(source, profile), encoding, MOST_LINES))
     if fit is None:
+        from groundstation.readers.drafts.nearest import why_no_header
+
         wanted = ", ".join(dict.fromkeys((*profile.required, *profile.time.asked)))
-        raise UnreadableLogError(
-            source.name,
-            f"no header row for profile {profile.name}",
-            f"a row with the columns {wanted}",
-            f"check {profile.path.name}",
+        told = "; ".join(
+            filter(None, (f"no header row for profile {profile.name}", why_no_header(_seen(source, profile), profile)))
         )
+        raise UnreadableLogError(source.name, told, f"a row with the columns {wanted}", f"check {profile.path.name}")
     return fit
 
 
@@ -343,3 +366,17 @@ def _slips(fit: Fit) -> dict[tuple[str, str], tuple[str, str]]:
     """
     known = (*(rule.name for rule in fit.profile.columns), *(name for name in fit.profile.time.columns))
     return {(fit.profile.raw_topic, name): (name, meant) for name, meant in slips(fit.names, known).items()}
+
+
+def laid(source: Source, profile: Profile) -> tuple[Fit, TableLayout]:
+    """Return the match of a profile to a table, and the layout that it gives.
+
+    Raises
+    ------
+    UnreadableLogError
+        When the file has no header row with the columns that the profile asks for.
+    """
+    fit = _joined(source, _fitted(source, profile))
+    seen = _seen(source, profile, fit.cells, fit.joined)
+    utc_of_zero_ns, _remarks = _utc_of_zero(fit, fit.metadata)
+    return fit, layout_of(fit, seen, utc_of_zero_ns, None)[0]

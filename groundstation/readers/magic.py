@@ -58,3 +58,10 @@ def is_binary(source: Source) -> bool:
     sample = source.head[:4096]
     control = sum(byte < 32 and byte not in (9, 10, 12, 13) for byte in sample)
     return b"\0" in sample or control * 20 > len(sample)
+
+
+def is_wide_text(source: Source) -> bool:
+    """Tell whether the head looks like UTF-16 without its mark: every other byte is zero."""
+    sample = source.head[:4096]
+    zeros = [sample[start::2].count(0) for start in (0, 1)]
+    return len(sample) > 3 and max(zeros) > 0.8 * len(sample) / 2 and min(zeros) < 0.02 * len(sample)

@@ -16,7 +16,7 @@ from groundstation.readers.told import ColumnFacts, bare, told
 _MOST_ABOVE = 20  # lines above a header in the middle of a file that belong to it
 _TIMES: Mapping[str, re.Pattern[str]] = {
     "local": re.compile(r"\d{1,2}:\d\d:\d\d(\.\d*)?"),
-    "iso": re.compile(r"\d{4}-?\d\d.*"),
+    "iso": re.compile(r"\d{4}[-/.]?\d\d?.*"),
     "seconds": re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?"),
     "nanoseconds": re.compile(r"[+-]?\d+"),
     "utc_counter": re.compile(r".*\d.*"),

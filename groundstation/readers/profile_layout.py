@@ -25,6 +25,7 @@ from groundstation.readers.profile_fit import Fit
 from groundstation.readers.source import Source
 from groundstation.readers.told import ColumnFacts
 
+_MOST_TOLD = 20  # missing columns
 _HEIGHTS = {"altitude_ellipsoid_m": "ellipsoid", "altitude_msl_m": "msl"}
 
 
@@ -57,13 +58,24 @@ def layout_of(
             _feed(fit, adapted, at, norths, fed)
     missing = [rule.name for rule in profile.columns if rule.name not in fit.position and not rule.is_optional]
     if missing:
-        text = f"profile {profile.name} names columns that are not there: {', '.join(missing)}"
+        text = f"profile {profile.name} names columns that are not there: {_with_nearest(fit, missing)}"
         fed.remarks.append(Remark("missing_columns", text))
     derivations = [*fed.derivations, *_derivations(fit, fed)]
     rules = [*fed.rules.values(), *_raw(fit, fed.rules.values(), derivations, time)]
     decimal_comma = uses_decimal_comma(fit.first_rows, fit.delimiter)
     texts = tuple(text for text in profile.missing if number_of(text) is None)
     return TableLayout(time, tuple(rules), tuple(derivations), decimal_comma, missing=texts), fed.remarks
+
+
+def _with_nearest(fit: Fit, missing: Sequence[str]) -> str:
+    """Name missing columns, each with those of the file that it may be."""
+    from groundstation.readers.drafts.nearest import nearest_names
+
+    targets = {rule.name: f"{rule.topic}.{rule.field.name}" for rule in fit.profile.columns}
+    free = [name for name in fit.names if name and name not in targets and name not in fit.profile.time.columns]
+    near = {name: nearest_names(name, targets[name], free) for name in missing[:_MOST_TOLD]}
+    told = [f"{name} (nearest: {', '.join(found)})" if found else name for name, found in near.items()]
+    return ", ".join(told) + (f" and {len(missing) - _MOST_TOLD} more" if len(missing) > _MOST_TOLD else "")
 
 
 def _time(fit: Fit) -> TimeRule:

@@ -33,6 +33,7 @@ from groundstation.readers import (
     ulog,
 )
 from groundstation.readers.compressed import COMPRESSIONS, compression_of
+from groundstation.readers.profile_sources import other_profiles
 from groundstation.readers.source import Claim, Reader, Source
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ class Format:
 
 @cache
 def _plug_ins() -> tuple[dict[str, Reader], tuple[str, ...]]:
-    """Third-party readers by name, and one line for each that could not be loaded."""
+    """Third-party readers by name, and one line for each plug-in that cannot be used."""
     readers: dict[str, Reader] = {}
     taken = {built_in.NAME for built_in in _BUILT_IN}
 
@@ -72,7 +73,7 @@ def _plug_ins() -> tuple[dict[str, Reader], tuple[str, ...]]:
         return ""
 
     failures = load_plug_ins(ENTRY_POINT_GROUP, "reader", take)
-    return readers, failures
+    return readers, (*failures, *other_profiles().failures)
 
 
 def _named(error: BaseException) -> str:
@@ -286,6 +287,15 @@ def _unclaimed(source: Source, refusals: list[GroundstationError], troubles: lis
         )
     if refusals:
         return refusals[0]
+    if not magic.is_binary(source):
+        from groundstation.readers.drafts.nearest import advice_on
+
+        advice = advice_on(source, csv_profile.known_profiles(), flat_csv.PAGE)
+        if advice is not None:
+            more = f" ({'; '.join(troubles)})" if troubles else ""
+            return UnclaimedLogError(source.name, advice.found + more, "", advice.next_step)
+    if magic.is_wide_text(source):
+        return UnclaimedLogError(source.name, "UTF-16 text without its mark", "UTF-8", "save it as CSV in UTF-8")
     found = "binary data of an unknown format" if magic.is_binary(source) else "text that no reader claims"
     names = ", ".join(reader for reader in _readers())
     found += f" ({'; '.join(troubles)})" if troubles else ""

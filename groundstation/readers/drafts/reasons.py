@@ -1,0 +1,44 @@
+"""Reasons in the damage of a table: why the cells of a column cannot be read."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+from groundstation.base.errors import GroundstationError
+from groundstation.base.records import Damage, Item
+from groundstation.readers.drafts.causes import cause_of_numbers, cause_of_times
+from groundstation.readers.drafts.sample import TableSample, sample_of
+from groundstation.readers.source import Source
+
+
+def with_reasons(items: Iterator[Item], source: Source, columns: Mapping[str, str], time: str) -> Iterator[Item]:
+    """Yield the items; damage of unreadable cells gets the cause that the cells show.
+
+    Parameters
+    ----------
+    items : iterator of items
+    source : Source
+    columns : mapping of place to column
+        Column by the place that damage names: ``topic.field``, or the columns of the time.
+    time : str
+        Place of the times.
+    """
+    sample: TableSample | None = None
+    for item in items:
+        place = item.place.rpartition(", row")[0] if isinstance(item, Damage) else ""
+        if isinstance(item, Damage) and item.kind == "unreadable_cells" and place in columns:
+            try:
+                sample = sample or sample_of(source)
+            except GroundstationError:
+                yield item
+                continue
+            cause = _cause(sample, columns[place], is_time=place == time)
+            yield replace(item, what=f"{item.what} ({cause})") if cause else item
+        else:
+            yield item
+
+
+def _cause(sample: TableSample, name: str, *, is_time: bool) -> str:
+    if name not in sample.names:
+        return ""
+    cells = sample.filled(sample.names.index(name))
+    return cause_of_times(cells) if is_time and cells else cause_of_numbers(cells, sample.delimiter)

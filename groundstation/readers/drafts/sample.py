@@ -1,0 +1,258 @@
+"""Sample of a table: its delimiter, its header row, its first rows and some later ones."""
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray
+from groundstation.base.errors import UnreadableLogError
+from groundstation.readers.dialect import (
+    DELIMITERS,
+    HeadLine,
+    detect_encoding,
+    head_lines,
+    split_cells,
+    uses_decimal_comma,
+)
+from groundstation.readers.drafts.causes import MISSING
+from groundstation.readers.drafts.words import Meaning, meaning_of
+from groundstation.readers.magic import is_binary, is_wide_text
+from groundstation.readers.source import Source
+from groundstation.readers.spaced import SpacedSource
+
+_NUMBER = re.compile(r"[+-]{0,2}(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?|nan|NaN|NAN|[+-]?inf")
+_TIME = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}.*|\d{1,2}:\d\d(?::\d\d)?(?:[.,]\d*)?(?: ?[AaPp][Mm])?")
+_FIRST_LINES, _MOST_BEHIND = 2000, 10
+_WINDOWS, _WINDOW_BYTES = 8, 32 << 10  # later pieces of the file that are looked at
+_MOST_ROWS = 1000  # of each piece
+_MOST_CELLS = 400_000  # of all pieces: a table of ten thousand columns is looked at with a few rows
+ENOUGH = 0.9  # share of the cells that have to be numbers
+
+
+@dataclass(frozen=True)
+class TableSample:
+    """Part of a table that is looked at.
+
+    Parameters
+    ----------
+    name, encoding, delimiter : str
+    header : HeadLine or None
+        The line of names; None of a table that has none.
+    names : tuple of str
+        Cells of the header row; ``column_1`` ... of a table without one.
+    behind : tuple of tuple of str
+        Cells of the rows between the header and the data: units, other names.
+    blocks : tuple of tuple of tuple of str
+        Rows that follow one another, piece by piece; each has as many cells as there are names.
+    is_spaced : bool
+        Blanks part the cells; they are seen as tabs.
+    """
+
+    name: str
+    encoding: str
+    delimiter: str
+    header: HeadLine | None
+    names: tuple[str, ...]
+    behind: tuple[tuple[str, ...], ...]
+    blocks: tuple[tuple[tuple[str, ...], ...], ...]
+    is_spaced: bool = False
+    _numbers: dict[int, FloatArray] = field(default_factory=dict)
+
+    @cached_property
+    def has_decimal_comma(self) -> bool:
+        """Tell whether numbers have a decimal comma that readers understand."""
+        rows = [self.delimiter.join(row) for row in self.blocks[0][:100]]
+        return uses_decimal_comma(rows, self.delimiter)
+
+    @cached_property
+    def columns(self) -> tuple[tuple[str, ...], ...]:
+        """Cells of each column, of all pieces."""
+        return tuple(zip(*(row for block in self.blocks for row in block), strict=True))
+
+    @cached_property
+    def meanings(self) -> tuple[Meaning | None, ...]:
+        """Meaning of each column by its name and the rows of units."""
+        if self.header is None:
+            return (None,) * len(self.names)
+        return tuple(
+            meaning_of(name, tuple(row[at] for row in self.behind if row[at])) for at, name in enumerate(self.names)
+        )
+
+    def numbers(self, at: int) -> FloatArray:
+        """Return a column as numbers; NaN where a cell is none."""
+        if at not in self._numbers:
+            self._numbers[at] = np.array([self.number(cell) for cell in self.columns[at]], dtype=np.float64)
+        return self._numbers[at]
+
+    def number(self, cell: str) -> float:
+        """Return a cell as a number, NaN where it is none."""
+        if not cell or not _NUMBER.fullmatch(cell):
+            return np.nan
+        text = cell.replace(",", ".") if self.has_decimal_comma else cell
+        try:
+            return float(text.replace("+-", "-"))
+        except ValueError:
+            return np.nan
+
+    def filled(self, at: int) -> list[str]:
+        """Return the cells of a column that are neither empty nor a sign for that."""
+        return [cell for cell in self.columns[at] if cell and cell.lower() not in MISSING]
+
+    def signs(self, at: int) -> set[str]:
+        """Return the signs for missing values in a column."""
+        return {cell for cell in self.columns[at] if cell.lower() in MISSING}
+
+    def is_of_numbers(self, at: int) -> bool:
+        """Tell whether a column is one of numbers."""
+        filled = len(self.filled(at))
+        found = int(np.count_nonzero(np.isfinite(self.numbers(at))))
+        return filled > 0 and found >= ENOUGH * filled
+
+    def parts(self, at: int) -> Iterator[FloatArray]:
+        """Yield the numbers of a column, piece by piece."""
+        start, values = 0, self.numbers(at)
+        for block in self.blocks:
+            yield values[start : start + len(block)]
+            start += len(block)
+
+
+def sample_of(source: Source) -> TableSample:
+    """Return a sample of a table.
+
+    Raises
+    ------
+    UnreadableLogError
+        When the file is empty, no text, or holds no table.
+    """
+    if source.is_empty:
+        raise UnreadableLogError(source.name, "an empty file", "a table", "check how it was copied")
+    encoding = detect_encoding(source.head, source.name)
+    if is_binary(source):
+        if is_wide_text(source):
+            raise UnreadableLogError(source.name, "UTF-16 text without its mark", "UTF-8", "save it as CSV in UTF-8")
+        raise UnreadableLogError(source.name, "binary data", "a table of text", "export the log as CSV")
+    lines = head_lines(source, encoding, _FIRST_LINES)
+    shapes = [found for delimiter in DELIMITERS if (found := _Shape.of(lines, delimiter)) is not None]
+    is_spaced = not any(one.first_row is not None for one in shapes)
+    if is_spaced and (spaced := _spaced(source, encoding)) is not None:
+        source, lines, shape = spaced
+        return _sample(source, encoding, lines, shape, is_spaced=True)
+    if not shapes:
+        raise UnreadableLogError(
+            source.name,
+            "no table",
+            "a row of names and rows of as many cells, parted by comma, semicolon, tab or blanks",
+        )
+    shape = max(shapes, key=lambda one: (one.first_row is not None and one.header is not None, one.share, one.cells))
+    if shape.first_row is None:
+        raise UnreadableLogError(source.name, "names but no rows of numbers below", "a header and rows")
+    return _sample(source, encoding, lines, shape)
+
+
+def _spaced(source: Source, encoding: str) -> "tuple[Source, list[HeadLine], _Shape] | None":
+    """Return a table whose cells are parted by blanks, with tabs for them; None where it is none."""
+    seen = SpacedSource(source.path, source)
+    lines = head_lines(seen, encoding, _FIRST_LINES)
+    shape = _Shape.of(lines, "\t")
+    return None if shape is None or shape.first_row is None or shape.share < ENOUGH / 2 else (seen, lines, shape)
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """Shape of lines by one delimiter: cells of a row, places of header and first row."""
+
+    delimiter: str
+    cells: int
+    share: float
+    header: int | None
+    first_row: int | None
+
+    @classmethod
+    def of(cls, lines: Sequence[HeadLine], delimiter: str) -> "_Shape | None":
+        rows = [split_cells(line.text, delimiter) for line in lines[:300]]
+        counts = Counter(len(row) for row in rows if len(row) > 1)
+        if not counts:
+            return None
+        cells = max(counts, key=lambda count: (counts[count], count))
+        share = round(counts[cells] / max(1, sum(1 for line in lines[:300] if line.text.strip())), 1)
+        first = next((at for at, row in enumerate(rows) if len(row) == cells and _is_row(row)), None)
+        header = None if first is None else _header_above(rows, first, cells)
+        if first is not None and header is None:  # rows that end with a delimiter that the header lacks
+            header = _header_above(rows, first, cells - 1) if cells > 2 and not rows[first][-1] else None
+        return cls(delimiter, cells, share, header, first)
+
+
+def _is_row(cells: Sequence[str]) -> bool:
+    """Tell whether cells are those of a row: numbers or times among them."""
+    return any(_NUMBER.fullmatch(cell) or _TIME.fullmatch(cell) for cell in cells)
+
+
+def _header_above(rows: Sequence[Sequence[str]], first: int, cells: int) -> int | None:
+    """Return the place of the header row: the line above the first row that names the most."""
+    places = []
+    for at in range(first - 1, max(-1, first - _MOST_BEHIND - 2), -1):
+        row = rows[at]
+        if len(row) == cells and any(row) and not _is_row(row):
+            places.append(at)
+        elif any(row):
+            break
+    if not places:
+        return None
+    return max(places, key=lambda at: (_known_names(rows[at]), len(set(filter(None, rows[at]))) > cells // 2, -at))
+
+
+def _known_names(row: Sequence[str]) -> int:
+    found = [meaning_of(name.lstrip("# ")) for name in row[:500]]
+    return len({one.target or one.role for one in found if one is not None})
+
+
+def _sample(
+    source: Source, encoding: str, lines: Sequence[HeadLine], shape: _Shape, *, is_spaced: bool = False
+) -> TableSample:
+    header = None if shape.header is None else lines[shape.header]
+    assert shape.first_row is not None
+    behind: tuple[tuple[str, ...], ...] = ()
+    if header is None:
+        names = tuple(f"column_{at + 1}" for at in range(shape.cells))
+    else:
+        first, *rest = split_cells(header.text, shape.delimiter)
+        names = (first.lstrip("# "), *rest)
+        rows = [split_cells(line.text, shape.delimiter) for line in lines[shape.header + 1 : shape.first_row]]  # type: ignore[operator]
+        behind = tuple(tuple(row[: len(names)] + [""] * (len(names) - len(row))) for row in rows)
+    count = len(names)
+    most = max(20, min(_MOST_ROWS, _MOST_CELLS // (count * (_WINDOWS + 1))))
+    blocks = [tuple(_rows((line.text for line in lines[shape.first_row :]), shape.delimiter, count, most))]
+    blocks += [tuple(_rows(piece, shape.delimiter, count, most)) for piece in _later(source, encoding)]
+    kept = tuple(block for block in blocks if block)
+    if not kept:
+        raise UnreadableLogError(source.name, "names but no rows below", "a header and rows")
+    return TableSample(source.name, encoding, shape.delimiter, header, names, behind, kept, is_spaced)
+
+
+def _rows(texts: Iterator[str] | Sequence[str], delimiter: str, count: int, most: int) -> Iterator[tuple[str, ...]]:
+    found = 0
+    for text in texts:
+        cells = split_cells(text, delimiter)
+        is_row = len(cells) == count or (len(cells) == count + 1 and not cells[-1])
+        if is_row and _is_row(cells):
+            yield tuple(cells[:count])
+            found += 1
+        if found == most:
+            return
+
+
+def _later(source: Source, encoding: str) -> Iterator[list[str]]:
+    """Yield the whole lines of some pieces behind the head of a file."""
+    begin = len(source.head)
+    room = source.size - begin
+    if room < _WINDOWS * _WINDOW_BYTES:
+        return
+    with source.open() as stream:
+        for place in range(_WINDOWS):
+            stream.seek(begin + place * (room - _WINDOW_BYTES) // (_WINDOWS - 1))
+            text = stream.read(_WINDOW_BYTES).decode(encoding, errors="replace")
+            yield text.replace("\r", "\n").split("\n")[1:-1]

@@ -1,0 +1,279 @@
+"""Time of the rows of a table, found by names and values."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray
+from groundstation.base.errors import UnreadableLogError
+from groundstation.base.toml_text import quoted
+from groundstation.readers.drafts.causes import cause_of_times, date_order
+from groundstation.readers.drafts.sample import ENOUGH, TableSample
+from groundstation.readers.drafts.words import meaning_of
+
+_ISO = re.compile(r"\d{4}[-/.]\d\d?[-/.]\d\d?[T ]\d\d?:\d\d.*")
+_DAY = re.compile(r"\d{4}[-/.]?\d\d?[-/.]?\d\d?|\d{1,2}[/.-]\d{1,2}[/.-](?:\d{4}|\d\d)")
+_CLOCK = re.compile(r"\d{1,2}:\d\d:\d\d(?:\.\d*)?")
+_OFFSET = re.compile(r"[+-]\d{1,2}:?\d\d")
+_RISING = 0.98  # share of the steps that do not go back
+_SINCE_1970 = {"s": (8e8, 4e9), "ms": (8e11, 4e12), "us": (8e14, 4e15), "ns": (8e17, 4e18)}
+SECONDS = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
+_PRIME = 0.9  # share of rows with a time of their own
+_WEEK_S = 604_800.0
+
+
+@dataclass(frozen=True)
+class TimeGuess:
+    """Time of the rows: the columns, the lines of ``[time]``, why.
+
+    ``seconds`` are the times of the rows of the sample, NaN where there are none. ``doubt``: what the user has to look
+    at.
+    """
+
+    columns: tuple[int, ...]
+    lines: tuple[str, ...]
+    why: str
+    seconds: FloatArray
+    is_absolute: bool
+    doubt: str = ""
+    rank: int = 0
+
+    @property
+    def own(self) -> float:
+        """Share of the rows that have a time of their own."""
+        known = self.seconds[np.isfinite(self.seconds)]
+        return len(np.unique(known)) / max(1, len(known))
+
+
+def time_of(sample: TableSample) -> TimeGuess:
+    """Return the time of the rows.
+
+    An absolute time is taken before a counter, unless it repeats: a counter then tells the rows apart.
+
+    Raises
+    ------
+    UnreadableLogError
+        When no column is a time; the cause is named where it is known.
+    """
+    found = [*_of_iso(sample), *_of_local(sample), *_of_week(sample), *_of_numbers(sample)]
+    if not found:
+        raise UnreadableLogError(sample.name, *_no_time(sample))
+    found += [*_of_both(sample, found)]
+    fine = [one for one in found if one.own >= _PRIME] or found
+    return max(fine, key=lambda one: (one.is_absolute, one.rank, one.own))
+
+
+def _of_both(sample: TableSample, found: list[TimeGuess]) -> Iterator[TimeGuess]:
+    """Yield UTC in whole seconds together with a counter that tells the rows apart."""
+    utc = next((one for one in found if one.is_absolute and one.own < _PRIME), None)
+    counter = next((one for one in found if not one.is_absolute and one.own >= _PRIME), None)
+    if utc is None or counter is None or any(one.is_absolute and one.own >= _PRIME for one in found):
+        return
+    of_utc = [line.replace("column =", "utc =") for line in utc.lines[1:] if not line.startswith("offset")]
+    of_counter = [line.replace("column =", "counter =") for line in counter.lines[1:]]
+    yield TimeGuess(
+        (*counter.columns, *utc.columns),
+        ('kind = "utc_counter"', *of_counter, *of_utc),
+        f"{utc.why}, in whole seconds, beside a counter",
+        counter.seconds,
+        True,
+        "; ".join(filter(None, (utc.doubt, counter.doubt))),
+        counter.rank + 1,
+    )
+
+
+def _of_week(sample: TableSample) -> Iterator[TimeGuess]:
+    """Yield GPS week and seconds of the week."""
+    by_role = {one.role: at for at, one in reversed(list(enumerate(sample.meanings))) if one is not None and one.role}
+    if not {"week", "tow"} <= by_role.keys():
+        return
+    week, tow = by_role["week"], by_role["tow"]
+    seconds, weeks = sample.numbers(tow), sample.numbers(week)
+    if not (sample.is_of_numbers(tow) and sample.is_of_numbers(week)):
+        return
+    unit = "ms" if np.nanmax(seconds) > 2 * _WEEK_S else "s"
+    seconds = seconds * SECONDS[unit] + weeks * _WEEK_S
+    if _rises(seconds) and np.nanmax(seconds) > np.nanmin(seconds):
+        lines = (
+            'kind = "gps_week"',
+            f"week = {quoted(sample.names[week])}",
+            f"seconds = {quoted(sample.names[tow])}",
+            f'unit = "{unit}"',
+        )
+        doubt = "weeks below 1024 have rolled over: see earliest_year" if np.nanmax(weeks) < 1024 else ""
+        yield TimeGuess((week, tow), lines, "GPS week and seconds of the week", seconds, True, doubt, 3)
+
+
+def _no_time(sample: TableSample) -> tuple[str, str, str]:
+    """Return what was found instead of a time, what was expected, and the next step."""
+    for at, name in enumerate(sample.names):
+        meaning, cells = sample.meanings[at], sample.filled(at)
+        is_named = meaning is not None and meaning.role in ("time", "date", "clock")
+        if cells and (is_named or date_order(cells)) and (cause := cause_of_times(cells)):
+            return f"no time that can be read: column {name!r} has {cause}", "", ""
+    names = ", ".join(sample.names[:8]) + (", ..." if len(sample.names) > 8 else "")
+    return (
+        f"no column that is a time among {names}",
+        "numbers that rise, or dates",
+        "add a column with the time of each row",
+    )
+
+
+def _of_iso(sample: TableSample) -> Iterator[TimeGuess]:
+    for at, name in enumerate(sample.names):
+        cells = sample.columns[at]
+        filled = sample.filled(at)
+        if not filled or sum(map(bool, map(_ISO.fullmatch, filled))) < ENOUGH * len(filled):
+            continue
+        if len(filled) < 0.5 * len(cells):
+            continue
+        seconds = _iso_seconds(cells)
+        if _rises(seconds) and np.ptp(seconds[np.isfinite(seconds)]) > 0.0:
+            doubt = "" if re.search(r"Z$|[+-]\d\d:?\d\d$|UTC$", filled[0].strip()) else "names no zone: read as UTC"
+            lines = ('kind = "iso"', f"column = {quoted(name)}")
+            yield TimeGuess(
+                (at,), lines, f"dates such as {filled[0]}", seconds, True, doubt=doubt, rank=_rank(sample, at)
+            )
+
+
+def _iso_seconds(cells: tuple[str, ...]) -> FloatArray:
+    """Return rough times since 1970 in seconds: good for steps, not for reading."""
+    found = np.full(len(cells), np.nan)
+    for at, cell in enumerate(cells):
+        match = re.match(r"(\d{4})[-/.](\d\d?)[-/.](\d\d?)[T ](\d\d?):(\d\d)(?::(\d\d(?:[.,]\d+)?))?", cell)
+        if match:
+            year, month, day, hour, minute = (int(part) for part in match.groups()[:5])
+            if 1 <= month <= 12 and 1 <= day <= 31:
+                days = np.datetime64(f"{year:04d}-{month:02d}-01", "D").astype(np.int64) + day - 1
+                found[at] = (
+                    days * 86400.0 + hour * 3600 + minute * 60 + float((match.group(6) or "0").replace(",", "."))
+                )
+    return found
+
+
+def _of_local(sample: TableSample) -> Iterator[TimeGuess]:
+    days = [at for at in range(len(sample.names)) if _are(sample, at, _DAY) and _is_day(sample, at)]
+    clocks = [at for at in range(len(sample.names)) if _are(sample, at, _CLOCK)]
+    if not days or not clocks:
+        return
+    day, clock = days[0], clocks[0]
+    formats, doubt = _date_formats(sample.filled(day))
+    if not formats:
+        return
+    offset = next((at for at in range(len(sample.names)) if _are(sample, at, _OFFSET)), None)
+    is_utc = any("utc" in sample.names[at].lower() or "gmt" in sample.names[at].lower() for at in (day, clock))
+    zone = quoted(sample.names[offset]) if offset is not None else '"UTC"'
+    if offset is None and not is_utc:
+        doubt = "; ".join(filter(None, (doubt, "nothing names the zone: read as UTC")))
+    lines = (
+        'kind = "local"',
+        f"date = {quoted(sample.names[day])}",
+        f"time = {quoted(sample.names[clock])}",
+        f"offset = {zone}",
+        f'date_formats = ["{formats}"]',
+    )
+    seconds = np.array([_clock_seconds(cell) for cell in sample.columns[clock]])
+    columns = (day, clock) if offset is None else (day, clock, offset)
+    yield TimeGuess(columns, lines, "date and time of day in two columns", seconds, True, doubt=doubt, rank=2)
+
+
+def _is_day(sample: TableSample, at: int) -> bool:
+    """Tell whether eight digits are a date: by the name, or by what parts them."""
+    meaning = sample.meanings[at]
+    return (meaning is not None and meaning.role == "date") or bool(re.search("[-/.]", sample.filled(at)[0]))
+
+
+def _date_formats(cells: list[str]) -> tuple[str, str]:
+    """Return the strptime format of dates, and a doubt."""
+    first = cells[0]
+    sign = next((one for one in "-/." if one in first), "")
+    if re.match(r"\d{4}", first):
+        return f"%Y{sign}%m{sign}%d", ""
+    year = "%Y" if re.search(r"\d{4}$", first) else "%y"
+    order = date_order(cells)
+    if order == "month/day":
+        return f"%m{sign}%d{sign}{year}", "month before day, as in the US"
+    if order == "day/month":
+        return f"%d{sign}%m{sign}{year}", ""
+    if order == "unclear":
+        is_us = sign == "/"
+        text = f"%m{sign}%d{sign}{year}" if is_us else f"%d{sign}%m{sign}{year}"
+        return text, f"day and month cannot be told apart: {'month' if is_us else 'day'} first is assumed"
+    return "", ""
+
+
+def _clock_seconds(cell: str) -> float:
+    match = re.match(r"(\d{1,2}):(\d\d):(\d\d(?:\.\d*)?)", cell)
+    return float(match[1]) * 3600 + float(match[2]) * 60 + float(match[3]) if match else np.nan
+
+
+def _are(sample: TableSample, at: int, pattern: re.Pattern[str]) -> bool:
+    filled = sample.filled(at)
+    return len(filled) > 0.5 * len(sample.columns[at]) and sum(
+        bool(pattern.fullmatch(cell.strip())) for cell in filled
+    ) >= ENOUGH * len(filled)
+
+
+def _of_numbers(sample: TableSample) -> Iterator[TimeGuess]:
+    for at, name in enumerate(sample.names):
+        meaning = sample.meanings[at]
+        is_named = meaning is not None and meaning.role == "time"
+        if meaning is not None and not is_named:
+            continue
+        values = sample.numbers(at)
+        known = values[np.isfinite(values)]
+        if len(known) < 2 or len(known) < 0.5 * len(values) or not sample.is_of_numbers(at):
+            continue
+        if not _rises(values) or np.ptp(known) <= 0.0:
+            continue
+        middle, step = float(np.median(known)), _step(sample, at)
+        since = next((unit for unit, (low, high) in _SINCE_1970.items() if low < middle < high), "")
+        is_first = at == next((place for place, column in enumerate(sample.columns) if any(column)), 0)
+        if (not is_named and not (is_first or since)) or not np.isfinite(step):
+            continue
+        if not is_named and not since and len(np.unique(known)) < _PRIME * len(known):
+            continue
+        unit, doubt = (since, "") if since else _unit_by(meaning.unit if meaning else "", known, step)
+        why = (
+            f"counts from 1970 in {unit}"
+            if since
+            else f"{'named so' if is_named else 'numbers that rise'}, steps of {step:g}"
+        )
+        if since and "gps" in name.lower() and unit == "s" and middle < 1.5e9:
+            doubt = "seconds since 1970 assumed: GPS seconds count from 1980 and differ by leap seconds"
+        lines = (f'kind = "{"unix" if since else "seconds"}"', f"column = {quoted(name)}", f'unit = "{unit}"')
+        rank = _rank(sample, at) + (0 if is_named else -2)
+        yield TimeGuess((at,), lines, why, values * SECONDS[unit], bool(since), doubt, rank)
+
+
+def _rank(sample: TableSample, at: int) -> int:
+    """Return how well a name fits: one that is known before others."""
+    meaning = sample.meanings[at] or meaning_of(sample.names[at].rpartition(".")[2])
+    return 2 if meaning is not None and meaning.role == "time" else 0
+
+
+def _unit_by(told: str, known: FloatArray, step: float) -> tuple[str, str]:
+    """Return the unit of a counter, as its name tells it or its steps show."""
+    if told:
+        return told, ""
+    is_whole = bool(np.all(known == np.floor(known)))
+    if not is_whole:
+        unit = "s" if step < 50.0 else "ms"
+    else:
+        unit = "s" if step <= 5.0 else "ms" if step < 2000.0 else "us" if step < 1e7 else "ns"
+    return unit, f"unit {unit} by its steps of {step:g}: check it"
+
+
+def _step(sample: TableSample, at: int) -> float:
+    """Return the median step between rows, zeros left out."""
+    steps = np.concatenate([np.diff(part) for part in sample.parts(at)])
+    steps = steps[np.isfinite(steps) & (steps > 0.0)]
+    return float(np.median(steps)) if len(steps) else np.nan
+
+
+def _rises(values: FloatArray) -> bool:
+    """Tell whether numbers hardly ever go back."""
+    steps = np.diff(values[np.isfinite(values)])
+    return len(steps) > 0 and bool(np.count_nonzero(steps >= 0.0) >= _RISING * len(steps))

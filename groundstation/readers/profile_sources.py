@@ -1,0 +1,88 @@
+"""Profiles of others: TOML files in the user's folder, and those that plug-ins bring.
+
+The folder is ``groundstation/profiles`` in the user's configuration directory. A plug-in names a file, a folder,
+several of them, or a module beside which they are, by an entry point of the group ``groundstation.profiles``. A profile
+that cannot be used is a line, and hides no other.
+"""
+
+import os
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from groundstation.base.errors import GroundstationError
+from groundstation.base.plug_ins import load_plug_ins
+from groundstation.readers.profile import Profile, load
+
+ENTRY_POINT_GROUP = "groundstation.profiles"
+MOST_FILES = 1000  # of one folder
+
+
+@dataclass(frozen=True)
+class OtherProfiles:
+    """Profiles of others, and a line for each that cannot be used."""
+
+    profiles: tuple[Profile, ...]
+    failures: tuple[str, ...]
+
+
+def user_folder() -> Path:
+    """Return the folder of the user's own profiles; it need not exist."""
+    if configured := os.environ.get("XDG_CONFIG_HOME"):
+        base = Path(configured)
+    elif sys.platform == "win32":
+        base = Path(os.environ.get("APPDATA") or Path.home() / "AppData/Roaming")
+    else:
+        base = Path(os.environ.get("HOME") or "~").expanduser() / ".config"
+    return base / "groundstation" / "profiles"
+
+
+@cache
+def other_profiles() -> OtherProfiles:
+    """Load the profiles of the user's folder and of plug-ins; the first of a name counts."""
+    found: dict[str, Profile] = {}
+    failures: list[str] = []
+    for path in _files(user_folder()):
+        failures += filter(None, [_taken(path, found)])
+
+    def take(offered: Any) -> str:
+        return "; ".join(filter(None, [_taken(path, found) for path in _named(offered)]))
+
+    failures += load_plug_ins(ENTRY_POINT_GROUP, "profile", take)
+    return OtherProfiles(tuple(found.values()), tuple(failures))
+
+
+def _taken(path: Path, found: dict[str, Profile]) -> str:
+    """Load a profile into those found; return why it is left out."""
+    try:
+        profile = load(path)
+    except GroundstationError as error:
+        return f"profile {path} is left out: {error}"
+    if profile.name in found:
+        return f"profile {path} is left out: {profile.name!r} is that of {found[profile.name].path}"
+    found[profile.name] = profile
+    return ""
+
+
+def _named(offered: Any) -> Iterator[Path]:
+    """Yield the files that a plug-in names."""
+    if isinstance(offered, str | Path):
+        path = Path(offered)
+        yield from _files(path) if path.is_dir() else (path,)
+    elif getattr(offered, "__file__", None):
+        yield from _files(Path(offered.__file__).parent)
+    elif isinstance(offered, Iterable):
+        for one in offered:
+            yield from _named(one)
+    else:
+        raise TypeError("names no TOML file, folder or module")
+
+
+def _files(folder: Path) -> list[Path]:
+    try:
+        return sorted(folder.glob("*.toml"))[:MOST_FILES]
+    except OSError:
+        return []
