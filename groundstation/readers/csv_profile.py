@@ -27,7 +27,7 @@ from groundstation.readers.profile_fit import Fit, delimiter_of, delimiters_of, 
 from groundstation.readers.profile_layout import layout_of
 from groundstation.readers.profile_sources import other_profiles
 from groundstation.readers.rtklib_tag import TaggedClock, clock_by_tag
-from groundstation.readers.sections import MOST, TableSection, header_places, left_out, mark_of, told
+from groundstation.readers.sections import MOST, TableSection, header_places, left_out, lines_with, mark_of, told
 from groundstation.readers.source import Claim, Source
 from groundstation.readers.spaced import FixedSource, SpacedSource
 from groundstation.readers.start import unusable_references, utc_of_zero
@@ -309,7 +309,7 @@ def _sections(
     stands_again, last_byte, own_until = False, None, first.last.number
     places = (
         ()
-        if profile.names or profile.key
+        if profile.names or profile.key or not _may_have_headers(source, first, mark)
         else header_places(source, first.last, first.encoding, mark, lambda line: bool(delimiter_of(line, profile)))
     )
     for place in places:
@@ -339,6 +339,16 @@ def _sections(
         sections.append(TableSection(fit.dialect_to(end, stands_again), layout, shift_ns, facts))
         remarks += more
     return sections, remarks
+
+
+def _may_have_headers(source: Source, first: Fit, mark: re.Pattern[bytes]) -> bool:
+    """Tell whether a mark of header lines stands below the first header.
+
+    Blanks need not be turned into tabs for that.
+    """
+    if not isinstance(source, SpacedSource):
+        return True
+    return next(iter(lines_with(source.whole, first.last, first.encoding, mark)), None) is not None
 
 
 def _utc_of_zero(fit: Fit, metadata: Mapping[str, str]) -> tuple[int | None, list[Remark]]:

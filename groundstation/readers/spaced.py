@@ -136,12 +136,14 @@ def tabbed(text: NDArray[np.uint8], cells: int = 0, joined: Sequence[int] = ()) 
     >>> tabbed(line), tabbed(line, 5, (1, 2))
     (b'  7 \\t47\\t00\\t12.5  \\t3 \\n', b'  7 \\t47 00 12.5  \\t3 \\n')
     """
-    is_blank = (text == _BLANK) | (text == _TAB)
-    changes = np.flatnonzero(np.diff(is_blank, prepend=False, append=False))
-    first, begins = changes[::2], changes[1::2]  # of each run of blanks, and what stands behind it
-    is_inside = ~_ends_line(text[first - 1]) & ~_ends_line(text[np.minimum(begins, len(text) - 1)]) & (first > 0)
-    begins = begins[is_inside]
-    converted = np.where(is_blank, np.uint8(_BLANK), text)
+    converted = text.copy()
+    converted[text == _TAB] = _BLANK
+    is_blank = converted == _BLANK
+    changes = np.flatnonzero(is_blank[1:] != is_blank[:-1]) + 1
+    if len(is_blank) and is_blank[0]:
+        changes = changes[1:]  # blanks before the first cell part none
+    starts, begins = changes[: len(changes) // 2 * 2 : 2], changes[1::2]  # of each run of blanks, and behind it
+    begins = begins[~_ends_line(text[starts - 1]) & ~_ends_line(text[begins])]
     converted[begins - 1] = _TAB
     if joined and len(begins):
         line = np.searchsorted(np.flatnonzero(_ends_line(text)), begins)
