@@ -10,7 +10,7 @@ import pyarrow as pa
 from groundstation.base.records import Column
 from groundstation.readers import cells
 from groundstation.readers.cells import TableCells
-from groundstation.readers.layout import LayoutRule
+from groundstation.readers.layout import LayoutRule, number_of
 from groundstation.readers.rows import restore_delimiters
 
 _FILLERS: Mapping[str, float | str | bool] = {"double": float("nan"), "bool": False, "text": ""}
@@ -56,18 +56,3 @@ def _without_numbers(read: TableCells, missing: Sequence[str]) -> TableCells:
     numbers = [number for text in missing if (number := number_of(text)) is not None]
     is_none = np.isin(read.column.values, numbers) & read.column.mask
     return replace(read, column=Column(read.column.values, read.column.mask & ~is_none)) if is_none.any() else read
-
-
-def number_of(text: str) -> float | None:
-    """Return the finite number that a text states, None where it is none.
-
-    Examples
-    --------
-    >>> number_of("9999"), number_of("N/A"), number_of("nan")
-    (9999.0, None, None)
-    """
-    try:
-        number = float(text)
-    except ValueError:
-        return None
-    return number if np.isfinite(number) else None

@@ -16,7 +16,7 @@ import numpy as np
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.slips import slips
-from groundstation.readers.dates import day_ns
+from groundstation.readers.days import day_ns
 from groundstation.readers.dialect import Dialect, HeadLine, detect_encoding, head_lines
 from groundstation.readers.drafts.reasons import with_reasons
 from groundstation.readers.layout import TableLayout

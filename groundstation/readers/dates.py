@@ -1,6 +1,5 @@
 """Conversion of local date, time and UTC offset in columns of text to UTC nanoseconds."""
 
-from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -9,28 +8,8 @@ import pyarrow.compute as pc
 from groundstation.base import arrow_values as arrow
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
-from groundstation.readers.cells import MAX_TIME_NS, TableCells
-
-_NS_PER_DAY = 86_400 * NS_PER_S
-_EPOCH_DAY = datetime(1970, 1, 1).toordinal()
-
-
-def day_ns(text: str, formats: tuple[str, ...]) -> int | None:
-    """Return the beginning of a day, ns since 1970; None where no strptime format fits.
-
-    Examples
-    --------
-    >>> day_ns("2/1/70", ("%Y-%m-%d", "%d/%m/%y"))
-    86400000000000
-    """
-    for form in formats:
-        try:
-            found_ns = (datetime.strptime(text, form).toordinal() - _EPOCH_DAY) * _NS_PER_DAY
-        except ValueError:
-            continue
-        if abs(found_ns) < MAX_TIME_NS - _NS_PER_DAY:
-            return found_ns
-    return None
+from groundstation.readers.cells import TableCells
+from groundstation.readers.days import day_ns
 
 
 def _time_of_day_ns(text: str, formats: tuple[str, ...]) -> int | None:

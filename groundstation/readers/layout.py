@@ -305,6 +305,21 @@ METHODS: Mapping[str, DerivationMethod] = MappingProxyType(
 )
 
 
+def number_of(text: str) -> float | None:
+    """Return the finite number that a text states, None where it is none.
+
+    Examples
+    --------
+    >>> number_of("9999"), number_of("N/A"), number_of("nan")
+    (9999.0, None, None)
+    """
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    return number if np.isfinite(number) else None
+
+
 def rule_for(
     column: int, topic: str, known: Field, factor: float = 1.0, offset: float = 0.0, raw: Key | None = None
 ) -> LayoutRule:

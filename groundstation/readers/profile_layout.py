@@ -7,10 +7,18 @@ import numpy as np
 
 from groundstation.base.records import Remark
 from groundstation.base.signals import field_of
-from groundstation.readers.conversions import number_of
-from groundstation.readers.dates import day_ns
+from groundstation.readers.days import day_ns
 from groundstation.readers.dialect import uses_decimal_comma
-from groundstation.readers.layout import METHODS, Derivation, Key, LayoutRule, TableLayout, TimeRule, rule_for
+from groundstation.readers.layout import (
+    METHODS,
+    Derivation,
+    Key,
+    LayoutRule,
+    TableLayout,
+    TimeRule,
+    number_of,
+    rule_for,
+)
 from groundstation.readers.norths import LOOKED_AT, OF_MOTION, Norths, by_motion, by_the_field, day_of, samples_of
 from groundstation.readers.profile import ColumnRule, DerivedRule
 from groundstation.readers.profile_fit import Fit

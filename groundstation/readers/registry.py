@@ -24,6 +24,7 @@ from groundstation.readers import (
     dataflash,
     flat_csv,
     flightdata_hdf5,
+    igc,
     magic,
     receiver,
     rtklib_pos,
@@ -42,7 +43,7 @@ ENTRY_POINT_GROUP = "groundstation.readers"
 FLAT_CSV = f"the flat CSV ({flat_csv.PAGE})"
 _OF_TEXT: tuple[Reader, ...] = (csv_profile, flat_csv, rtklib_pos)
 _BUILT_IN: tuple[Reader, ...] = (
-    *(chapter10, dataflash, ulog, flightdata_hdf5, receiver, sbet, bags, tlog),
+    *(chapter10, dataflash, ulog, flightdata_hdf5, receiver, sbet, bags, tlog, igc),
     *_OF_TEXT,
 )
 

@@ -1,53 +1,21 @@
 """Times of rows: the cells of the columns of time become nanoseconds."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from groundstation.base import arrow_values as arrow
-from groundstation.base.records import BoolArray, Column, Int64Array
+from groundstation.base.records import Column
 from groundstation.base.timescales import gps_week_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.readers import cells
 from groundstation.readers.cells import TableCells
 from groundstation.readers.dates import local_ns, time_of_day_ns
+from groundstation.readers.days import DayCount
 from groundstation.readers.layout import TimeRule
 
 _MOST_WEEKS, _MOST_WEEK_NS = 10_000, 2 * 604_800 * NS_PER_S  # some writers let the seconds run on over the week
-_DAY_NS = 86_400 * NS_PER_S
-
-
-@dataclass
-class DayCount:
-    """Days that have passed since the first row, where rows tell the time of the day alone.
-
-    A time that is most of a day before the one above is of the next day; a clock that is set goes back by less.
-    """
-
-    _last_ns: int = -1
-    _days: int = 0
-
-    def days_ns(self, time_ns: Int64Array, present: BoolArray) -> Int64Array:
-        """Return the time to add to times of the day, nanoseconds, shape (n,).
-
-        Examples
-        --------
-        >>> hours = np.array([23, 0, 1, 23]) * 3600 * NS_PER_S
-        >>> (DayCount().days_ns(hours, np.ones(4, dtype=bool)) // (86400 * NS_PER_S)).tolist()
-        [0, 1, 1, 0]
-        """
-        known = time_ns[present]
-        if not len(known):
-            return np.zeros(len(time_ns), dtype=np.int64)
-        before = np.append(known[0] if self._last_ns < 0 else self._last_ns, known[:-1])
-        steps = known - before
-        days = self._days + np.cumsum((steps < -_DAY_NS // 2).astype(np.int64) - (steps > _DAY_NS // 2))
-        self._last_ns, self._days = int(known[-1]), int(days[-1])
-        found = np.zeros(len(time_ns), dtype=np.int64)
-        found[present] = days * _DAY_NS
-        return found
 
 
 def times_of(rule: TimeRule, texts: Sequence[Any], days: DayCount) -> tuple[TableCells, int]:

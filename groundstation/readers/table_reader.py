@@ -26,12 +26,13 @@ from groundstation.base.records import (
 from groundstation.base.signals import kind_of
 from groundstation.readers import cells
 from groundstation.readers.conversions import read_cells
+from groundstation.readers.days import DayCount
 from groundstation.readers.dialect import Dialect
 from groundstation.readers.inside import new_logs, with_own_zeros
 from groundstation.readers.layout import METHODS, Key, LayoutRule, TableLayout, apply
 from groundstation.readers.losses import Losses
 from groundstation.readers.places import PLACED, without_place, zeroed
-from groundstation.readers.row_times import DayCount, times_of
+from groundstation.readers.row_times import times_of
 from groundstation.readers.rows import RowBlock, RowScanner
 from groundstation.readers.sections import TableSection
 from groundstation.readers.source import Source

@@ -241,9 +241,65 @@ def hdf5_starts(data: bytes) -> Iterator[int]:
             yield from range(at + 4, min(at + 40, len(data)), 8)
 
 
+def waypoint() -> bytes:
+    """Text of Inertial Explorer: blanks, GPS weeks, degrees, minutes and seconds."""
+    head = (
+        "Project:     line 7\nProgram:     Inertial Explorer Version 8.90\n\n"
+        " Week    GPSTime       Latitude       Longitude      H-Ell    VEast SDEast SDNorth    Heading Q\n"
+        "           (sec)      (+/-D M S)      (+/-D M S)       (m)    (m/s)    (m)     (m)      (deg)\n"
+    )
+    rows = (
+        f" 2313 {122418 + k}.000 47 00 {k % 60:02d}.50000 -0 30 {k % 60:02d}.0  91.4  12.0 0.03 0.04 90.0 1\n"
+        for k in range(200)
+    )
+    return (head + "".join(rows)).encode()
+
+
+def states() -> bytes:
+    """State vectors of three aircraft."""
+    head = "time,icao24,lat,lon,velocity,heading,vertrate,callsign,onground,alert,spi,squawk,baroaltitude,geoaltitude\n"
+    rows = (
+        f"{1714989600 + k // 3},{('4b1814', '3c6444', '400abc')[k % 3]},47.{k},8.{k},100,90,NULL,X,False,,,7000,NaN,900\n"
+        for k in range(300)
+    )
+    return (head + "".join(rows)).encode()
+
+
+def skyview() -> bytes:
+    """User log of a SkyView: UTC in whole seconds beside a counter."""
+    head = (
+        "Session Time,GPS Fix Quality,Number of Satellites,GPS Date & Time,Latitude (deg),Longitude (deg),"
+        "GPS Altitude (feet),Ground Speed (knots),Ground Track (deg),Mag Var (deg),Pitch (deg),Roll (deg),"
+        "Magnetic Heading (deg)\n"
+    )
+    rows = (
+        f"{500 + k / 4},2,9,2024-05-06 10:00:{k // 4 % 60:02d},27.{k},-82.4,1000,100,90,5,1,2,85\n" for k in range(200)
+    )
+    return (head + "".join(rows)).encode()
+
+
+def radio() -> bytes:
+    """Log of a radio: two numbers in one cell, date and time in two."""
+    head = "Date,Time,1RSS(dB),GPS,GSpd(kmh),Hdg(\u00b0),Sats,Curr(A),Rud,Ele,Thr,Ail,TxBat(V)\n"
+    rows = (
+        f"2024-05-06,10:{k // 60:02d}:{k % 60:02d}.500,-70,47.{k:06d} -122.25,36.0,90,12,5.5,0,0,-1024,0,7.9\n"
+        for k in range(200)
+    )
+    return (head + "".join(rows)).encode()
+
+
+def igc() -> bytes:
+    """Flight record of a glider."""
+    head = "AXXX001\r\nHFDTE060524\r\nHFGIDGLIDERID:D-1\r\nI023638FXA3940SIU\r\n"
+    rows = (f"B2359{k % 60:02d}4730{k:03d}N00815000EA010000110000509\r\n" for k in range(200))
+    return (head + "".join(rows) + "E100000PEV\r\n").encode()
+
+
 _STARTS: dict[str, Callable[[bytes], Iterator[int]]] = {
     "flat-csv": line_starts,
     "csv-profile": line_starts,
+    "tables": line_starts,
+    "igc": line_starts,
     "ulog": ulog_starts,
     "dataflash": starts_with(DATAFLASH_MAGIC),
     "mcap": mcap_starts,
@@ -271,6 +327,8 @@ _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
         lambda: (SAMPLES / "taxi-damaged.csv").read_bytes(),
     ),
     "csv-profile": (g1000,),
+    "tables": (waypoint, states, skyview, radio),
+    "igc": (igc,),
     "ulog": (ulog,),
     "dataflash": (dataflash,),
     "chapter10": (chapter10,),

@@ -254,8 +254,6 @@ def test_case_e2_and_e3() -> None:
 
 
 def test_text_of_inertial_explorer_is_not_misread(tmp_path: Path) -> None:
-    from groundstation.base.errors import UnclaimedLogError
-
     path = tmp_path / "ie.txt"
     path.write_text(
         "Project:     test\nProgram:     Inertial Explorer Version 8.90\n\n"
@@ -264,5 +262,5 @@ def test_text_of_inertial_explorer_is_not_misread(tmp_path: Path) -> None:
         + " 2313 122418.000 47 00 00.00000 -122 00 00.00000  91.440   12.000    0.000    0.000   90.0000000 1\n"
         * 50
     )
-    with pytest.raises(UnclaimedLogError):
-        registry.identify(path)
+    assert registry.identify(path).detail == "inertial-explorer"
+    assert one(Read(path), "ins", "longitude_deg") == -122.0

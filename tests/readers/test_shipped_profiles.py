@@ -125,7 +125,7 @@ CASES = (
         {
             "gnss.latitude_deg": 47.5,
             "gnss.longitude_deg": -122.25,
-            "gnss.altitude_msl_m": 120.0,
+            "raw.blackbox.GPS_altitude": 120.0,
             "gnss.ground_speed_mps": 10.5,
             "gnss.track_deg": 90.0,
             "gnss.satellites_used": 12.0,
