@@ -437,7 +437,7 @@ def _again(run: OurPass, done: Pass) -> Pass:
 def by_us(of: Given) -> Side:
     """Return the run of our filter alone."""
     run = prepared(of)
-    linear = linear_room(run.samples, run.plan)
+    linear = linear_room(run.plan)
 
     def filtered() -> float:
         now, room, epochs = run.start.now(), make_room(run.start.prior), len(run.plan.epoch_s)

@@ -73,9 +73,9 @@ def write_sbet(path: Path, track: Track) -> int:
 def write_accuracies(path: Path, track: Track) -> int:
     """Write the sigmas of the positions as SMRMSG, and return how many.
 
-    Only positions whose sigmas are all known have some. They are those of position in metres and of velocity in m/s,
-    both north, east, down, and of roll, pitch and heading in minutes of arc. Times are those of the SBET. No file is
-    written where there are none.
+    They are those of position in metres, of velocity in m/s, both north, east, down, and of roll, pitch and heading in
+    minutes of arc, of the positions of which all are known. Times are those of the SBET. No file is written where there
+    are none.
     """
     placed = np.flatnonzero(np.isfinite([track.column(name) for name in NEEDED]).all(axis=0))
     sigmas = np.array([track.column(name)[placed] for name in SIGMAS])

@@ -48,7 +48,7 @@ def _claim(answer: InertialResult, headline: str, judged: JudgedFilter | None) -
     reason = typeset(answer.kind_reason).strip().rstrip(".")
     sentences = (f"{reason[:1].upper()}{reason[1:]}.",) if reason else ()
     value = figures[0][1] if figures else ""
-    unseen = "its own drift cannot be seen" if judged is None else f"its errors stand {judged.by}"
+    unseen = "its own drift cannot be seen" if judged is None else f"its errors are judged {judged.by}"
     remark = f"INS − GNSS, 95 %; {unseen}" if figures else unseen
     left = answer.worst_departure
     if left is not None:
@@ -137,7 +137,8 @@ def _errors(judged: JudgedFilter | None) -> Note | None:
         return None
     constant = f" Constant, and no error of the filter: {'; '.join(judged.constants)}." if judged.constants else ""
     wrong = f"Worst: {judged.wrong}. " if judged.worst else ""
-    text = f"{wrong}Errors of the INS {judged.by}: {judged.errors}.{constant} That chapter has them along the flight."
+    along = "The chapter of what judges it has them along the flight."
+    text = f"{wrong}Errors of the INS, judged {judged.by}: {judged.errors}.{constant} {along}"
     return Note(typeset(text), "good" if judged.worst is None else "warn")
 
 

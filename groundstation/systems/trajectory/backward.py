@@ -8,7 +8,16 @@ Source: G. J. Bierman, Fixed interval smoothing with discrete measurements, Int.
 
 from groundstation.base.compile import in_place
 from groundstation.methods.kalman.arrays import Pattern
-from groundstation.systems.trajectory.states import KEPT_ROWS, STATES, WIDTH, FloatArray, Linear, Schedule, Solved
+from groundstation.systems.trajectory.states import (
+    KEPT_ROWS,
+    NAVIGATION,
+    STATES,
+    WIDTH,
+    FloatArray,
+    Linear,
+    Schedule,
+    Solved,
+)
 
 
 @in_place
@@ -98,6 +107,7 @@ def run_backward(
     solved: Solved,
     begin: int,
     end: int,
+    seldom: int,
     a: FloatArray,
     A: FloatArray,
     w: FloatArray,
@@ -112,6 +122,8 @@ def run_backward(
 
     Parameters
     ----------
+    seldom : int
+        Epochs between two variances of the biases, which walk slowly.
     a, A : ndarrays, shapes (n,), (n, n)
         Zero at the end of the data; changed in place.
     w, u : ndarrays, shapes (n, n), (n,)
@@ -132,12 +144,16 @@ def run_backward(
             total, spread, beside = 0.0, 0.0, 0.0
             for j in range(STATES):
                 total += solved.p[e, i, j] * a[j]
+            x[e, i] = -total
+            if i >= NAVIGATION and e % seldom != 0 and e < end - 1:  # biases walk slowly
+                variance[e, i] = variance[e + 1, i]
+                continue
+            for j in range(STATES):
                 s = 0.0
                 for r in range(STATES):
                     s += A[j, r] * solved.p[e, i, r]
                 spread += solved.p[e, i, j] * s
                 beside += solved.p[e, 0, j] * s
-            x[e, i] = -total
             variance[e, i] = solved.p[e, i, i] - spread
             if i == 1:
                 plane[e] = solved.p[e, 0, 1] - beside

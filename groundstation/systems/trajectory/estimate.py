@@ -131,6 +131,17 @@ class Estimate:
     travel: slip.Travel
 
     @property
+    def constant_sigma_m(self) -> FloatArray:
+        """Sigma of a constant error of GNSS position, north, east, down, shape (3,).
+
+        It is what the slow error leaves of what the receiver states.
+
+        An error that lasts longer than the log is seen by nothing in it: the fit takes it for none.
+        """
+        share = 1.0 - min(1.0, self.model.slow_scale) ** 2
+        return np.asarray(self.problem.sigma_m * np.sqrt(share))
+
+    @property
     def latency_s(self) -> float:
         """Latency of GNSS position."""
         return self.problem.latency_s + float(self.result.constants[LAT])
@@ -180,7 +191,7 @@ def hypotheses_of(problem: Problem, model: Model, rules: Gate) -> tuple[Hypothes
     )
     early = int(np.searchsorted(plan.epoch_s, _first_motion_s(problem.gnss, plan.epoch_s[0]) + PRUNE_S))
     early = min(early, len(plan.epoch_s))
-    room = linear_room(problem.samples, plan)
+    room = linear_room(plan)
 
     def run(begin: int, end: int, now: Now, work: Room) -> float:
         return run_forward(

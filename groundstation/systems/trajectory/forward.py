@@ -60,11 +60,8 @@ BLOCK = 9 * LEV  # entries of the navigation rows of the transition
 
 
 @in_place
-def carry(e: int, first: int, last: int, imu: Imu, noise: Noise, now: Now, room: Room, linear: Linear) -> None:
-    """Carry the estimate over samples and fill the transition of epoch e.
-
-    The samples are ``first`` to before ``last``.
-    """
+def carry(e: int, schedule: Schedule, imu: Imu, noise: Noise, now: Now, room: Room, linear: Linear) -> None:
+    """Carry the estimate over the samples of epoch e and fill its transition."""
     value, nav, step, spent = now.value, now.nav, room.step, linear.spent
     begin_transition(room.grown)
     turn = room.y
@@ -72,8 +69,7 @@ def carry(e: int, first: int, last: int, imu: Imu, noise: Noise, now: Now, room:
         turn[i] = 0.0
         spent[e, i] = 0.0
     spent[e, 3] = 0.0
-    keeps = linear.nav.shape[0] > 0
-    for k in range(first, last):
+    for k in range(schedule.first[e], schedule.first[e + 1]):
         mechanise(imu.interval_s, imu.angle, imu.velocity, k, value, nav, now.before, room.C, step)
         grow_transition(room.C, step, room.grown)
         for i in range(3):
@@ -83,9 +79,10 @@ def carry(e: int, first: int, last: int, imu: Imu, noise: Noise, now: Now, room:
         spent[e, 1] += (a * a + b * b + c * c) / imu.interval_s[k]
         spent[e, 2] += imu.angle_variance[k]
         spent[e, 3] += imu.velocity_variance[k]
-        if keeps:
+        slot = schedule.slot[k]
+        if slot >= 0:
             for i in range(10):
-                linear.nav[k, i] = nav[i]
+                linear.nav[slot, i] = nav[i]
     total = spent[e, 0]
     finish_transition(nav, total, turn, room.grown, linear.F[e])
     for i in range(7):
@@ -279,7 +276,7 @@ def run_forward(
     likelihood = 0.0
     for e in range(begin, end):
         if carries:
-            carry(e, schedule.first[e], schedule.first[e + 1], imu, noise, now, room, linear)
+            carry(e, schedule, imu, noise, now, room, linear)
             linearise(e, schedule, seen, now, room, linear)
             if linear.value.shape[0] > 0:
                 for j in range(STATES):

@@ -89,11 +89,17 @@ def raised(
     return Factors(position, velocity, tilt, heading), rows
 
 
-def with_factors(track: TrackOfStates, factors: Factors) -> TrackOfStates:
-    """Return the states with raised sigmas."""
+def with_factors(track: TrackOfStates, factors: Factors, constant_m: FloatArray) -> TrackOfStates:
+    """Return the states with raised sigmas.
+
+    Parameters
+    ----------
+    constant_m : ndarray, shape (3,)
+        Sigma of an error of GNSS that lasts all through the log: no check on the log itself shows it.
+    """
     return replace(
         track,
-        position_sigma_m=track.position_sigma_m * factors.position,
+        position_sigma_m=np.hypot(track.position_sigma_m * factors.position, constant_m),
         velocity_sigma_mps=track.velocity_sigma_mps * factors.velocity,
         attitude_sigma_deg=track.attitude_sigma_deg * np.array([factors.tilt, factors.tilt, factors.heading]),
     )

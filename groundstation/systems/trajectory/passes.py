@@ -38,6 +38,8 @@ from groundstation.systems.trajectory.states import (
 LONGEST_EPOCH_S = 0.2  # the transition is linear over it
 GAP_SHARE = 0.5  # of an interval: a sample that begins so much later than the last ended has a gap before it
 ENTRIES = BLOCK + 7
+OUTPUT_HZ = 20.0  # of states
+SELDOM = 5  # epochs between two variances of the biases
 MEAN_S = 0.2  # vibration is averaged away, manoeuvres are not
 
 
@@ -113,6 +115,23 @@ class Plan:
     epoch_s: FloatArray
 
 
+def output_samples(samples: Samples, first: int, rate_hz: float = OUTPUT_HZ) -> Int64Array:
+    """Return the samples from ``first`` on at which states are given: at most ``rate_hz``."""
+    step = np.floor((samples.time_s[first:] - samples.time_s[first]) * rate_hz + 1e-6)
+    return np.flatnonzero(np.concatenate([[True], np.diff(step) > 0.0])) + first
+
+
+def _slots(samples: Samples, first: Int64Array, ends: Int64Array) -> Int64Array:
+    """Return the row that keeps the estimate after each sample.
+
+    At ends of epochs and where states are given.
+    """
+    is_kept = np.zeros(len(samples.time_s), dtype=bool)
+    is_kept[ends - 1] = True
+    is_kept[output_samples(samples, int(first[0]))] = True
+    return np.where(is_kept, np.cumsum(is_kept) - 1, -1).astype(np.int64)
+
+
 def lay_out(samples: Samples, seen_at: Observations, begin_s: float, latency_s: float, lag_s: float = 0.0) -> Plan:
     """Lay out the epochs from ``begin_s`` on.
 
@@ -137,7 +156,7 @@ def lay_out(samples: Samples, seen_at: Observations, begin_s: float, latency_s: 
     seen = np.searchsorted(epoch, np.arange(len(epoch_s) + 1))
     back_s = epoch_s[epoch] - valid_s[order]
     return Plan(
-        Schedule(first.astype(np.int64), seen.astype(np.int64)),
+        Schedule(first.astype(np.int64), seen.astype(np.int64), _slots(samples, first, ends)),
         Seen(
             np.ascontiguousarray(seen_at.kind[order]),
             np.ascontiguousarray(back_s),
@@ -209,11 +228,11 @@ def all_kept(plan: Plan) -> Solved:
     )
 
 
-def linear_room(samples: Samples, plan: Plan) -> Linear:
+def linear_room(plan: Plan) -> Linear:
     """Return room for the linearisation of a plan."""
     epochs, scalars = len(plan.epoch_s), 3 * len(plan.seen.kind)
     return Linear(
-        np.empty((len(samples.time_s), 10)),
+        np.empty((int(plan.schedule.slot.max()) + 1, 10)),
         np.empty((epochs, STATES)),
         np.empty((epochs, ENTRIES)),
         np.empty((epochs, 4)),
@@ -240,6 +259,8 @@ class Pass:
         Smoothed correction to the estimate before the measurements of each epoch, and its variance.
     plane : ndarray, shape (e,)
         Covariance of the smoothed position, north with east.
+    before_variance : ndarray, shape (e, NAVIGATION)
+        Variance of the filter before the measurements of each epoch.
     constants, constants_variance : ndarrays, shape (STATES,)
         Values of the constants at the end; smoothed they are the same at all times.
     begun, start : Start
@@ -253,6 +274,7 @@ class Pass:
     x: FloatArray
     variance: FloatArray
     plane: FloatArray
+    before_variance: FloatArray
     constants: FloatArray
     constants_variance: FloatArray
     begun: Start
@@ -270,6 +292,8 @@ def run_pass(
     start: Start,
     line: Line = OWN_ESTIMATE,
     known: Linear | None = None,
+    *,
+    keeps_all: bool = False,
 ) -> Pass:
     """Filter forward over all epochs and smooth back.
 
@@ -279,9 +303,11 @@ def run_pass(
         Trajectory that it is linearised about; its own estimate where there is none.
     known : Linear, optional
         Linearisation about ``line`` from an earlier pass with the same epochs: only the solving is left.
+    keeps_all : bool
+        Covariances and gains of the filter stay in ``solved``; they are most of the memory.
     """
     epochs = len(plan.epoch_s)
-    linear = linear_room(samples, plan) if known is None else known
+    linear = linear_room(plan) if known is None else known
     solved = all_kept(plan)
     now, room = start.now(), make_room(start.prior)
     likelihood = run_forward(
@@ -312,6 +338,7 @@ def run_pass(
         solved,
         0,
         epochs,
+        1 if keeps_all else SELDOM,
         np.zeros(STATES),
         square[0],
         square[1],
@@ -323,10 +350,24 @@ def run_pass(
         start.p,
     )
     x += solved.before[:, :KEPT_ROWS]
+    before_variance = np.diagonal(solved.p[:, :NAVIGATION, :NAVIGATION], axis1=1, axis2=2).copy()
+    if not keeps_all:
+        solved = solved._replace(p=solved.p[:0].copy(), K=solved.K[:0].copy())
     constants = linear.value[-1] + solved.after[-1]
     begun = first + start.prior
     return Pass(
-        plan, linear, solved, likelihood, x, variance, plane, constants, solved.variance[-1], start, moved(start, begun)
+        plan,
+        linear,
+        solved,
+        likelihood,
+        x,
+        variance,
+        plane,
+        before_variance,
+        constants,
+        solved.variance[-1],
+        start,
+        moved(start, begun),
     )
 
 
@@ -381,7 +422,7 @@ def line_of(one: Pass) -> Line:
     """
     last = one.plan.schedule.first[1:] - 1
     begin = one.start
-    nav = np.array(one.linear.nav[np.maximum(last, 0)])
+    nav = np.array(one.linear.nav[one.plan.schedule.slot[np.maximum(last, 0)]])
     nav[0] = begin.nav
     correction = np.array(one.x[:, :NAVIGATION])
     correction[0] = 0.0

@@ -148,9 +148,12 @@ def _answered(
     moving = _moving(plain, settings)
     sigma_deg = float(np.median(plain.attitude_sigma_deg[moving, 2]))
     factors, raised = judge.raised(outages, own, sigma_deg, rolls=main.problem.has_slip)
-    smoothed = judge.with_factors(plain, factors)
+    constant_m = main.constant_sigma_m
+    smoothed = judge.with_factors(plain, factors, constant_m)
     forward = judge.with_factors(
-        joined([forward_track(one.problem.samples, one.result, segment=i) for i, one in enumerate(estimates)]), factors
+        joined([forward_track(one.problem.samples, one.result, segment=i) for i, one in enumerate(estimates)]),
+        factors,
+        constant_m,
     )
     sigma_deg *= factors.heading
     hypotheses = _hypotheses(main)

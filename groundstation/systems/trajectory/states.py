@@ -83,6 +83,7 @@ class Schedule(NamedTuple):
 
     first: Int64Array  # (e + 1,) samples of epoch i: first[i] to first[i + 1]
     seen: Int64Array  # (e + 1,) measurements of epoch i: seen[i] to seen[i + 1]
+    slot: Int64Array  # (n,) row of ``Linear.nav`` that keeps the estimate after a sample, -1: not kept
 
 
 class Seen(NamedTuple):
@@ -154,7 +155,7 @@ class Line(NamedTuple):
 class Linear(NamedTuple):
     """Linearisation of a log about a trajectory: transitions and rows of the measurements."""
 
-    nav: FloatArray  # (n or 0, 10) estimate after each sample, before the measurements of its epoch
+    nav: FloatArray  # (slots, 10) estimate after the samples that are kept, before the measurements of their epoch
     value: FloatArray  # (e or 0, STATES) values at the end of each epoch, before its measurements
     F: FloatArray  # (e, entries)
     spent: FloatArray  # (e, 4) time, squared rate times time, variances of gaps: angle, velocity

@@ -8,19 +8,11 @@ from groundstation.base.angles import wrap_180, wrap_360
 from groundstation.base.geodesy import curvature_radii_m
 from groundstation.base.records import Int64Array
 from groundstation.systems.trajectory.model import DEG
-from groundstation.systems.trajectory.passes import Pass, Samples, turned
+from groundstation.systems.trajectory.passes import Pass, Samples, output_samples, turned
 from groundstation.systems.trajectory.solution import TrackOfStates
 from groundstation.systems.trajectory.states import ATT, NAVIGATION, VEL, FloatArray
 
-OUTPUT_HZ = 20.0
 LEAST_LEVEL = 0.05  # cosine of the pitch where heading and roll still have a sigma of their own
-
-
-def output_samples(samples: Samples, plan_first: int, rate_hz: float = OUTPUT_HZ) -> Int64Array:
-    """Return the samples at which states are given: at most ``rate_hz``."""
-    step = np.floor((samples.time_s[plan_first:] - samples.time_s[plan_first]) * rate_hz + 1e-6)
-    kept = np.concatenate([[True], np.diff(step) > 0.0])
-    return np.flatnonzero(kept) + plan_first
 
 
 def smoothed_track(samples: Samples, one: Pass, at: Int64Array | None = None, *, segment: int = 0) -> TrackOfStates:
@@ -43,7 +35,7 @@ def forward_track(samples: Samples, one: Pass, at: Int64Array | None = None, *, 
     """Return the states of the filter, which knows the past alone."""
     at = output_samples(samples, int(one.plan.schedule.first[0])) if at is None else at
     epoch, share = _place(samples, one, at)
-    before = np.diagonal(one.solved.p[:, :NAVIGATION, :NAVIGATION], axis1=1, axis2=2)
+    before = one.before_variance
     after = one.solved.variance[:, :NAVIGATION]
     spread = after[epoch - 1] * (1.0 - share) + before[epoch] * share
     begins = (one.solved.after - one.linear.closed)[:, :NAVIGATION]
@@ -61,7 +53,7 @@ def _place(samples: Samples, one: Pass, at: Int64Array) -> tuple[Int64Array, Flo
 def _states(
     samples: Samples, one: Pass, at: Int64Array, correction: FloatArray, variance: FloatArray, segment: int
 ) -> TrackOfStates:
-    nav = one.linear.nav[at]
+    nav = one.linear.nav[one.plan.schedule.slot[at]]
     north, east = curvature_radii_m(np.degrees(nav[:, 0]))
     latitude = nav[:, 0] + correction[:, 0] / (north + nav[:, 2])
     longitude = nav[:, 1] + correction[:, 1] / ((east + nav[:, 2]) * np.cos(nav[:, 0]))

@@ -86,7 +86,11 @@ def plan_of(samples: Samples, edges: list[int], seen: Seen | None = None, first_
     starts = np.zeros(len(edges) + 1) if first_seen is None else first_seen
     ends = np.concatenate([[samples.begin_s], samples.time_s])
     return Plan(
-        Schedule(np.array([edges[0], *edges], dtype=np.int64), np.asarray(starts, dtype=np.int64)),
+        Schedule(
+            np.array([edges[0], *edges], dtype=np.int64),
+            np.asarray(starts, dtype=np.int64),
+            np.arange(len(samples.time_s)),
+        ),
         found,
         np.arange(len(found.kind)),
         ends[edges],
@@ -95,7 +99,7 @@ def plan_of(samples: Samples, edges: list[int], seen: Seen | None = None, first_
 
 def carried(samples: Samples, plan: Plan, start: Start) -> Linear:
     """Carry a start over the epochs of a plan, without any measurement used."""
-    linear = linear_room(samples, plan)
+    linear = linear_room(plan)
     run_forward(
         samples.imu,
         plan.schedule,

@@ -160,7 +160,7 @@ def short_problem(family: Family, epochs: int, *, with_line: bool = False) -> tu
     p = np.sqrt(sigmas)[:, None] * (mix @ mix.T) * np.sqrt(sigmas)
     prior = 0.3 * np.sqrt(sigmas) * rng.standard_normal(STATES)
     plan = plan_of(samples, edges, seen, first_seen)
-    done = run_pass(samples, plan, NOISE, gate(1e6), replace(start, p=p, prior=prior))
+    done = run_pass(samples, plan, NOISE, gate(1e6), replace(start, p=p, prior=prior), keeps_all=True)
     return done, seen, p
 
 

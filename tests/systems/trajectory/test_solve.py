@@ -1,12 +1,14 @@
 """Whole analysis on simulated logs: what is accepted, doubtful and refused, and that sigmas hold."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 from groundstation.base.angles import wrap_180
 from groundstation.base.geodesy import north_east_m
+from groundstation.simulation.imu.families import Family
 from groundstation.simulation.imu.flight import ImuFlight, simulate_imu
 from groundstation.simulation.imu.settings import ImuSettings, MountingSettings, ReceiverSettings, StampSettings
 from groundstation.simulation.scenario import LogInterval
@@ -64,10 +66,16 @@ def errors_over_sigma(flight: ImuFlight, done: Estimate) -> dict[str, np.ndarray
     }
 
 
+@cache
+def found(family: Family) -> tuple[ImuFlight, Estimate]:
+    """A simulated log and its estimate."""
+    flight = simulate_imu(family, 3, settings=ImuSettings(duration_s=300.0, rate_hz=50.0))
+    return flight, estimate(*inputs(flight), may_roll=family == "drive", may_stop=family == "drive")
+
+
 @pytest.mark.parametrize("family", ["drive", "uav"])
-def test_errors_agree_with_their_sigmas(family: str) -> None:
-    flight = simulate_imu(family, 3, settings=ImuSettings(duration_s=300.0, rate_hz=50.0))  # type: ignore[arg-type]
-    done = estimate(*inputs(flight), may_roll=family == "drive", may_stop=family == "drive")
+def test_errors_agree_with_their_sigmas(family: Family) -> None:
+    flight, done = found(family)
     for name, ratio in errors_over_sigma(flight, done).items():
         assert np.sqrt(np.mean(ratio**2)) < 2.0, name
         assert np.abs(ratio).max() < WITHIN, name
@@ -88,12 +96,11 @@ def test_latency_lever_arm_and_gap_are_found() -> None:
 
 
 def test_outages_grow_with_their_length_and_stay_inside() -> None:
-    flight = simulate_imu("drive", 4, settings=ImuSettings(duration_s=400.0, rate_hz=50.0))
-    found = replay(estimate(*inputs(flight), may_roll=True))
-    rms = [float(np.sqrt(np.mean(found.error_m[found.of_length(length)] ** 2))) for length in (10.0, 60.0)]
+    outages = replay(found("drive")[1])
+    rms = [float(np.sqrt(np.mean(outages.error_m[outages.of_length(length)] ** 2))) for length in (10.0, 60.0)]
     assert rms[0] < rms[1] < 20.0
-    assert np.mean(found.ratio <= 1.0) > 0.8
-    assert np.median(found.forward_end_m / found.error_m) > 1.5
+    assert np.mean(outages.ratio <= 1.0) > 0.8
+    assert np.median(outages.forward_end_m / outages.error_m) > 1.5
 
 
 def test_later_in_time_all_is_the_same() -> None:

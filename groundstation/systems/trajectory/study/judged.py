@@ -12,6 +12,7 @@ from groundstation.simulation.imu.motion import true_states
 from groundstation.systems.trajectory.estimate import Estimate, estimate
 from groundstation.systems.trajectory.inputs import FloatArray, GnssFixes, ImuIncrements
 from groundstation.systems.trajectory.onboard_offsets import euler_deg
+from groundstation.systems.trajectory.passes import output_samples
 from groundstation.systems.trajectory.retime import on_a_line
 from groundstation.systems.trajectory.solution import TrackOfStates
 from groundstation.systems.trajectory.states import LAT
@@ -119,9 +120,9 @@ def run_of(family: StudyFamily, seed: tuple[int, int]) -> Run | None:
     except NotAssessableError:
         return None
     samples, done = found.problem.samples, found.result
-    first = int(done.plan.schedule.first[0])
-    times = samples.time_s[first:]
-    at = np.flatnonzero(np.diff(np.floor(times / EVERY_S), prepend=np.floor(times[0] / EVERY_S)) > 0) + first
+    given = output_samples(samples, int(done.plan.schedule.first[0]))
+    times = samples.time_s[given]
+    at = given[np.diff(np.floor(times / EVERY_S), prepend=np.floor(times[0] / EVERY_S)) > 0]
     smoothed, heading = squared_errors(flight, smoothed_track(samples, done, at))
     forward = forward_track(samples, done, at)
     known = forward.attitude_sigma_deg[:, 2] < HEADING_KNOWN_DEG
