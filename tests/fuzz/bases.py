@@ -258,9 +258,9 @@ def waypoint() -> bytes:
 def states() -> bytes:
     """State vectors of three aircraft."""
     head = "time,icao24,lat,lon,velocity,heading,vertrate,callsign,onground,alert,spi,squawk,baroaltitude,geoaltitude\n"
+    names = ("4b1814", "3c6444", "400abc")
     rows = (
-        f"{1714989600 + k // 3},{('4b1814', '3c6444', '400abc')[k % 3]},47.{k},8.{k},100,90,NULL,X,False,,,7000,NaN,900\n"
-        for k in range(300)
+        f"{1714989600 + k // 3},{names[k % 3]},47.{k},8.{k},100,90,NULL,X,False,,,7000,NaN,900\n" for k in range(300)
     )
     return (head + "".join(rows)).encode()
 

@@ -57,6 +57,7 @@ def answered(tmp_path_factory: pytest.TempPathFactory) -> Answered:
     return answers_of(flight, Configuration())[0]
 
 
+@pytest.mark.slow
 def test_the_aided_ins_is_judged_by_it(answered: Answered) -> None:
     best = answered.answers["trajectory"]
     assert isinstance(best, BestTrajectory) and best.state == "accepted"
@@ -72,6 +73,7 @@ def test_the_aided_ins_is_judged_by_it(answered: Answered) -> None:
     assert "heading wrong by" in told.text and "not estimated" not in told.text
 
 
+@pytest.mark.slow
 def test_the_heading_has_a_second_interval_that_agrees(answered: Answered) -> None:
     found = answered.answers["heading"]
     assert isinstance(found, HeadingResult) and found.by_states is not None
