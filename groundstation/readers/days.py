@@ -1,4 +1,4 @@
-"""Days: the beginning of one that is told as text, and the days that pass in times of the day."""
+"""Days: the beginning of one told as text, and the days that pass in times of the day."""
 
 from dataclasses import dataclass
 from datetime import datetime

@@ -64,4 +64,5 @@ def is_wide_text(source: Source) -> bool:
     """Tell whether the head looks like UTF-16 without its mark: every other byte is zero."""
     sample = source.head[:4096]
     zeros = [sample[start::2].count(0) for start in (0, 1)]
-    return len(sample) > 3 and max(zeros) > 0.8 * len(sample) / 2 and min(zeros) < 0.02 * len(sample)
+    is_every_other = len(sample) > 3 and max(zeros) > 0.8 * len(sample) / 2 and min(zeros) < 0.02 * len(sample)
+    return is_every_other and not _CONTROL.search(sample.replace(b"\0", b""))

@@ -203,7 +203,7 @@ def unclaimed(path: Path) -> UnclaimedLogError | None:
             return None
         is_none = source.is_empty or magic.companion(source) is not None
         claims, refusals, troubles = ([], [], []) if is_none else _claims(source)
-        error = None if claims else _unclaimed(source, refusals, troubles)
+        error = None if claims else _unclaimed(source, refusals, troubles, with_advice=False)
     except OSError:
         return None
     return error if isinstance(error, UnclaimedLogError) else None
@@ -272,7 +272,10 @@ def _own(claim: Any, name: str) -> Claim | None:
     return Claim(name, str(claim.detail), float(claim.confidence))
 
 
-def _unclaimed(source: Source, refusals: list[GroundstationError], troubles: list[str]) -> GroundstationError:
+def _unclaimed(
+    source: Source, refusals: list[GroundstationError], troubles: list[str], *, with_advice: bool = True
+) -> GroundstationError:
+    """Return why no reader claims a file; advice on a table takes a look at its rows."""
     if source.is_empty:
         return UnclaimedLogError(source.name, "an empty file", "a recorded log", "check how it was copied")
     companion = magic.companion(source)
@@ -287,7 +290,7 @@ def _unclaimed(source: Source, refusals: list[GroundstationError], troubles: lis
         )
     if refusals:
         return refusals[0]
-    if not magic.is_binary(source):
+    if with_advice and not magic.is_binary(source):
         from groundstation.readers.drafts.nearest import advice_on
 
         advice = advice_on(source, csv_profile.known_profiles(), flat_csv.PAGE)

@@ -130,6 +130,19 @@ def test_a_name_that_the_motion_contradicts_is_doubted(write: Write) -> None:
     assert any(one.startswith("heading: follows the motion") for one in draft.doubts)
 
 
+@pytest.mark.parametrize(("zero_deg", "expected"), [(90.0, "sign = -1, offset = 1.57079633"), (0.0, "sign = -1 }")])
+def test_a_yaw_that_turns_against_the_motion_is_turned(write: Write, zero_deg: float, expected: str) -> None:
+    """A yaw as robots have it, anticlockwise from east in radians, and one anticlockwise from north."""
+    rows = "".join(
+        f"{t},{lat:.8f},{lon:.8f},{math.radians((zero_deg - track + 180.0) % 360.0 - 180.0):.6f}\n"
+        for t, lat, lon, track in circle()
+    )
+    profile, text = drafted(write("a.csv", "time_s,lat,lon,yaw\n" + rows))
+    assert expected in text and "turns against the motion" in text
+    read = Read(profile.with_suffix(".csv"), profile)
+    assert read.values("ins", "true_heading_deg")[40] == pytest.approx(list(circle())[40][3], abs=1e-3)
+
+
 def test_a_magnetic_heading_is_made_true_by_the_variation_of_the_table(write: Write) -> None:
     text = "time_s,mag_heading,variation\n" + "".join(f"{t},{10 + t},5\n" for t in range(10))
     profile, _ = drafted(write("a.csv", text))

@@ -181,7 +181,7 @@ def test_our_own_entry_point_is_not_a_plug_in(plug_ins: list[Any]) -> None:
     ("name", "expected"),
     [
         ("damaged/log_220414_065328______EMPTY.csv", "empty"),
-        ("inertial/gv_rf15_attitude_error.csv", "no reader claims"),  # PROVENANCE: not in the flat CSV
+        ("inertial/gv_rf15_attitude_error.csv", "no profile claims"),  # PROVENANCE: not in the flat CSV
     ],
 )
 def test_recorded_logs_of_other_formats_are_named(name: str, expected: str) -> None:

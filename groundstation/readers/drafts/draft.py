@@ -28,6 +28,7 @@ _MOST_REQUIRED = 2  # besides the time: another name of any other column is told
 _FLAGS = frozenset(("0", "1", "true", "false"))
 _G_MPS2, _FULL_FIELD_NT = 9.80665, 47_000.0  # the field of the Earth is 25 000 to 65 000 nT
 _DIRECTIONS = ("true_heading_deg", "magnetic_heading_deg", "track_deg")
+_FROM_EAST_DEG = 45.0
 _UPRIGHT = 0.7  # share of gravity that an axis has which is called vertical
 # Up axis -> of each axis: the axis forward (x), right (y) or down (z) that it is along, and its sign.
 _TURNED: Mapping[str, Mapping[str, tuple[str, int]]] = {
@@ -65,6 +66,7 @@ class ColumnGuess:
     why: str = ""
     doubt: str = ""
     north: str = ""
+    offset: float = 0.0
 
     @property
     def line(self) -> str:
@@ -72,8 +74,9 @@ class ColumnGuess:
         scale = f", scale = {self.scale:g}" * (self.scale != 1.0)
         sign = ", sign = -1" * (self.sign < 0)
         unit = f", unit = {quoted(self.unit)}" * bool(self.unit)
+        offset = f", offset = {self.offset:.9g}" * bool(self.offset)
         north = f", north = {quoted(self.north)}" * bool(self.north)
-        entry = f"{quoted(self.name)} = {{ field = {quoted(self.target)}{unit}{scale}{sign}{north} }}"
+        entry = f"{quoted(self.name)} = {{ field = {quoted(self.target)}{unit}{scale}{sign}{offset}{north} }}"
         notes = "; ".join(filter(None, (self.values, self.why, f"? {self.doubt}" if self.doubt else "")))
         return f"{entry}  # {notes}" if notes else entry
 
@@ -288,6 +291,12 @@ class _Guesses:
         if name == "true_heading_deg" and moved is not None and moved.is_followed(values * factor):
             doubt = "follows the motion: perhaps a track, gnss.track_deg"
             return replace(guess, doubt="; ".join(filter(None, (guess.doubt, doubt))))
+        offset = None if moved is None or name != "true_heading_deg" else moved.against(values * factor)
+        if offset is not None:
+            is_from_east, is_from_north = abs(offset - 90.0) < _FROM_EAST_DEG, abs(offset) < _FROM_EAST_DEG
+            told = "from east" if is_from_east else "from north" if is_from_north else f"from {-offset:.0f} deg"
+            doubt = f"turns against the motion: counted anticlockwise {told}"
+            return replace(guess, sign=-1, offset=90.0 / factor if is_from_east else 0.0, doubt=_both(guess, doubt))
         if name == "true_heading_deg" and "true" not in words_of(guess.name):
             guess = replace(guess, doubt=_both(guess, "true north assumed"))
         has_variation = any(one is not None and one.role == "variation" for one in self._sample.meanings)
@@ -516,6 +525,7 @@ def facts_of(draft: Draft) -> Mapping[str, object]:
                 "unit": one.unit,
                 "scale": one.scale,
                 "sign": one.sign,
+                "offset": one.offset,
                 "values": one.values,
                 "why": one.why,
                 "doubt": one.doubt,

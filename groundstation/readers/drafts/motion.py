@@ -13,6 +13,7 @@ _BASELINE_S, _MOST_S = 1.0, 30.0
 _MOVED_M = 3.0
 _NEAR, _SPREAD = 0.12, 0.35  # relative: of a unit's factor, of the ratios among each other
 _FOLLOWS_DEG, _SAME = 6.0, 0.9
+_ALIGNED, _TURNED = 0.8, 0.7  # lengths of mean unit vectors
 _SPEEDS = {"mps": 1.0, "kt": 1852 / 3600, "kmh": 1 / 3.6, "mph": 0.44704, "fps": 0.3048, "cmps": 0.01, "mmps": 0.001}
 
 
@@ -53,6 +54,22 @@ class Motion:
             return False
         away = np.abs(wrap_180(there[use] - self.direction_deg[use]))
         return bool(np.mean(away < _FOLLOWS_DEG) > _SAME)
+
+    def against(self, values_deg: FloatArray) -> float | None:
+        """Return the offset of a direction that turns against the motion; None where it does not.
+
+        The direction of the motion is then the offset less the value: 90 where angles count from east, anticlockwise.
+        """
+        there = values_deg[self.rows]
+        use = np.isfinite(there)
+        if np.count_nonzero(use) < _FEWEST:
+            return None
+        heading, direction = np.deg2rad(there[use]), np.deg2rad(self.direction_deg[use])
+        with_it, against = (abs(np.mean(np.exp(1j * (direction - sign * heading)))) for sign in (1, -1))
+        spread = abs(np.mean(np.exp(1j * direction)))  # near 1 where nothing turned
+        if against < _ALIGNED or with_it > _ALIGNED or spread > _TURNED:
+            return None
+        return float(np.degrees(np.angle(np.mean(np.exp(1j * (direction + heading))))))
 
 
 def motion_of(latitude_deg: FloatArray, longitude_deg: FloatArray, seconds: FloatArray, sizes: list[int]) -> Motion:

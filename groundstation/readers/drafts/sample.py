@@ -154,10 +154,7 @@ def sample_of(source: Source) -> TableSample:
 
 
 def _spaced(source: Source, encoding: str) -> "tuple[Source, list[HeadLine], _Shape] | None":
-    """Return a table whose cells are parted by blanks, with tabs for them.
-
-    None where it is none.
-    """
+    """Return a table whose cells are parted by blanks, with tabs for them, or None."""
     seen = SpacedSource(source.path, source)
     lines = head_lines(seen, encoding, _FIRST_LINES)
     shape = _Shape.of(lines, "\t")
