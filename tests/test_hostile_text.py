@@ -168,6 +168,13 @@ TRIED = {
         "check --for heading {log} {mcap}",
         "check {log}x",
     ),
+    "profile": (
+        "profile list",
+        "profile new {log} -o {tmp}/draft.toml",
+        "profile check igc {log}",
+        "profile check {tmp}/draft.toml {log}",
+        "profile new {log}x",
+    ),
     "convert": ("convert -f -o {tmp}/a.mcap {log}", "convert --json -f -o {tmp}/b.mcap {log} ", "convert -o x {log}x"),
     "run": (
         "run -v -f -j 1 --no-pdf --progress json --only results -o {tmp}/run {log}",

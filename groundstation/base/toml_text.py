@@ -52,13 +52,20 @@ def toml_table(text: str, where: str, expected: str = "a TOML file", next_step: 
 
 
 def quoted(text: str) -> str:
-    """Return a text as TOML writes it, between quotes.
+    """Return a text as TOML writes it, between quotes; what is hidden is escaped.
 
     Examples
     --------
-    >>> print(quoted('Speed "GPS" \\u00b5\\x7f'))
-    "Speed \\"GPS\\" µ\\u007f"
+    >>> print(quoted('Speed "GPS" \\u00b5\\x7f\\u202e\\U000e0041'))
+    "Speed \\"GPS\\" µ\\u007f\\u202e\\U000e0041"
     """
     import json
 
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+    from groundstation.base.printable import is_hidden
+
+    written = json.dumps(text, ensure_ascii=False)
+    return "".join(_escaped(mark) if is_hidden(mark) else mark for mark in written)
+
+
+def _escaped(mark: str) -> str:
+    return f"\\u{ord(mark):04x}" if ord(mark) <= 0xFFFF else f"\\U{ord(mark):08x}"
