@@ -38,8 +38,11 @@ OPENS = {
 }
 
 
+LONG = {"dataflash/TestLog2_REENCODED_plane.BIN"}  # its trajectory takes seconds
+
+
 @pytest.mark.real_log
-@pytest.mark.parametrize("name", OPENS)
+@pytest.mark.parametrize("name", [pytest.param(one, marks=pytest.mark.slow) if one in LONG else one for one in OPENS])
 def test_a_recorded_log_opens_on_what_its_owner_asks(name: str) -> None:
     tone, word, headline, line = OPENS[name]
     top = front(groundstation.open(real_log(name)).results, systems().chapters)

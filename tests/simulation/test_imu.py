@@ -46,7 +46,7 @@ def test_gravity_is_that_of_the_tables() -> None:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-@pytest.mark.parametrize("rate_hz", [50.0, 250.0])
+@pytest.mark.parametrize("rate_hz", [50.0, pytest.param(250.0, marks=pytest.mark.slow)])
 def test_increments_are_exact(family: Family, rate_hz: float) -> None:
     """Every interval against three parts of it, each by a rule of twice as many nodes."""
     motion, step_s = _motion(family), 1.0 / rate_hz

@@ -231,7 +231,9 @@ class Relation:
 
         One on another vehicle does no better with its own times.
         """
-        is_near = self.unexplained <= settings.unexplained_max and self.misfit_mps <= settings.misfit_max_mps
+        clear = self.over_others >= settings.over_others_clear
+        most = settings.unexplained_clear_max if clear else settings.unexplained_max
+        is_near = self.unexplained <= most and self.misfit_mps <= settings.misfit_max_mps
         return self.over_others >= settings.over_others_min and is_near and self.lag_is_inside
 
 

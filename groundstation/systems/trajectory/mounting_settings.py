@@ -30,6 +30,8 @@ class MountingSettings:
     hidden_force_mps2: float = number(0.6, 0.0, 10.0)  # RMS along an axis whose sign a bias of 50 mg hides
     over_others_min: float = number(10.0, 1.0, 1000.0)  # log units over other times of GNSS
     unexplained_max: float = number(0.35, 0.01, 1.0)  # of the variance of GNSS's changes of velocity
+    over_others_clear: float = number(40.0, 1.0, 1000.0)  # so many: the unit is of this vehicle, its GNSS is poor
+    unexplained_clear_max: float = number(0.65, 0.01, 1.0)
     misfit_max_mps: float = number(1.0, 0.01, 100.0)  # RMS of a change of velocity in a step
     unrelated_motion_mps: float = number(0.25, 0.05, 20.0)  # change of velocity in a step that a unit cannot miss
     gravity_range_mps2: tuple[float, float] = (8.0, 12.5)  # median; aircraft in turns and cars on bad roads are inside

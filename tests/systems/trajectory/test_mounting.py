@@ -49,6 +49,7 @@ def found(pair: tuple[ImuIncrements, GnssFixes], family: Family, **more: object)
 # Found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", MOVING)
 def test_every_turn_is_found(family: Family) -> None:
     imu, gnss = simulated(family)
@@ -207,6 +208,7 @@ def test_axes_of_gyros_alone_are_refused(family: Family, change: str) -> None:
     assert OTHER_AXES in mounting.refused or LEFT_HANDED in mounting.refused
 
 
+@pytest.mark.slow
 def test_bias_of_an_axis_without_force_is_no_mirror() -> None:
     """To the side of an aeroplane there is nothing but the accelerometer's bias, whose sign may fit better reversed."""
     for seed in (4, 8):
@@ -395,6 +397,7 @@ def test_drive_with_the_case_upside_down_and_backwards() -> None:
     assert np.allclose(mounting.body_from_case, from_angles((180.0, 0.0, 180.0)), atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drive", [reference_drive, drive_0708])
 def test_recorded_drives_turned_and_spoiled(drive: object) -> None:
     imu, gnss = drive()  # type: ignore[operator]

@@ -167,6 +167,7 @@ def test_a_hover_that_does_not_turn_has_one_place_and_no_delay_of_note() -> None
     assert not any(one.spans for one in errors.rows)
 
 
+@pytest.mark.slow
 def test_the_share_of_logs_with_an_invented_span_is_small() -> None:
     """A filter that is right, beside a solution whose errors wander as its sigma says."""
     wrong, logs = 0, 40
