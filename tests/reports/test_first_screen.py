@@ -38,7 +38,8 @@ OPENS = {
 }
 
 
-LONG = {"dataflash/TestLog2_REENCODED_plane.BIN"}  # its trajectory takes seconds
+# Their trajectories take seconds.
+LONG = {"dataflash/TestLog2_REENCODED_plane.BIN", "foreign/robot_localization_husky_test1.bag"}
 
 
 @pytest.mark.real_log

@@ -236,6 +236,7 @@ def test_vibration_is_averaged_by_a_unit_that_integrates() -> None:
     assert spread[1] == pytest.approx(3.0, rel=0.05) and spread[0] < 0.5 * spread[1]
 
 
+@pytest.mark.slow
 def test_fixes_have_the_errors_that_are_stated() -> None:
     settings = ReceiverSettings(1.0, latency_s=0.3, stated_factor=0.5, outages=(LogInterval(200.0, 260.0),))
     runs = [simulate_imu("hover", seed, settings=ImuSettings(600.0, 10.0, gnss=settings)).gnss for seed in range(30)]

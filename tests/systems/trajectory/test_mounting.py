@@ -198,6 +198,7 @@ GYROS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", EVERY)
 @pytest.mark.parametrize("change", GYROS)
 def test_axes_of_gyros_alone_are_refused(family: Family, change: str) -> None:
