@@ -79,11 +79,6 @@ class ProfileCheck:
         """Tell whether cells or rows of the table were lost."""
         return any(damage.loses_data for damage in self.damages)
 
-    @property
-    def has_warnings(self) -> bool:
-        """Tell whether something is missing, or cannot be read."""
-        return bool(self.missing or self.causes)
-
 
 @dataclass
 class _Values:

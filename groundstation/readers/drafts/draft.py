@@ -15,7 +15,7 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.signals import Field, field_of
 from groundstation.base.toml_text import quoted
-from groundstation.base.units import CONVERSIONS
+from groundstation.base.units import CONVERSIONS, MPS2_PER_G
 from groundstation.readers.drafts.causes import are_angles, cause_of_numbers
 from groundstation.readers.drafts.motion import Motion, motion_of
 from groundstation.readers.drafts.sample import TableSample, sample_of
@@ -26,7 +26,7 @@ from groundstation.readers.source import Source
 MOST_LEFT = 100  # columns left over that the draft lists one by one
 _MOST_REQUIRED = 2  # besides the time: another name of any other column is told with the nearest ones
 _FLAGS = frozenset(("0", "1", "true", "false"))
-_G_MPS2, _FULL_FIELD_NT = 9.80665, 47_000.0  # the field of the Earth is 25 000 to 65 000 nT
+_FULL_FIELD_NT = 47_000.0  # the field of the Earth is 25 000 to 65 000 nT
 _DIRECTIONS = ("true_heading_deg", "magnetic_heading_deg", "track_deg")
 _FROM_EAST_DEG = 45.0
 _UPRIGHT = 0.7  # share of gravity that an axis has which is called vertical
@@ -381,7 +381,7 @@ def _by_values(guess: ColumnGuess, known: Field, size: FloatArray, are_radians: 
     finite = size[np.isfinite(size)]
     middle = float(np.median(finite)) if len(finite) else 0.0
     if known.unit == "mps2" and middle > 0.0:
-        choices = {"mps2": (_G_MPS2, 1.0), "g": (1.0, 1.0), "mg": (1000.0, 0.001)}
+        choices = {"mps2": (MPS2_PER_G, 1.0), "g": (1.0, 1.0), "mg": (1000.0, 0.001)}
         best = min(choices, key=lambda one: abs(np.log(middle / choices[one][0])))
         if abs(np.log(middle / choices[best][0])) < 0.3:
             return replace(

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from groundstation.base.errors import GroundstationError, near_names
-from groundstation.readers.drafts.causes import cause_of_times
 from groundstation.readers.drafts.sample import TableSample, sample_of
 from groundstation.readers.drafts.times import TimeGuess, time_of
 from groundstation.readers.drafts.words import meaning_of
@@ -146,15 +145,3 @@ def why_no_header(source: Source, profile: Profile) -> str:
             told.append(f"{name!r}" + (f" (nearest: {', '.join(map(repr, near))})" if near else ""))
     lacks = f"lacks {', '.join(told)}" if told else "is parted in another way"
     return f"row {sample.header.number}, which looks like the header, {lacks}"
-
-
-def cause_of_unread_times(source: Source, names: Sequence[str]) -> str:
-    """Return why times of a table cannot be read; empty where nothing shows it."""
-    try:
-        sample = sample_of(source)
-    except GroundstationError:
-        return ""
-    for name in names:
-        if name in sample.names and (cause := cause_of_times(sample.filled(sample.names.index(name)))):
-            return cause
-    return ""

@@ -17,7 +17,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import RecordBatch
-from groundstation.base.units import DEG_PER_RAD
+from groundstation.base.units import DEG_PER_RAD, M_PER_FOOT, MPS2_PER_G
 from groundstation.readers import imu
 from groundstation.readers.receiver.messages import MessagesByName
 from groundstation.readers.receiver.novatel import TimedMessages, solution_time
@@ -25,7 +25,6 @@ from groundstation.readers.receiver.novatel import TimedMessages, solution_time
 SOURCES = ("RAWIMUSX", "RAWIMUX")  # of both the one with more messages
 UNSCALED = ("RAWIMU", "RAWIMUS")
 _IMU_ERROR, _ENCRYPTED = 1, 2  # bits of imu_status_info: the counts are none
-_FOOT_M, _STANDARD_G = 0.3048, 9.80665
 _ARCSECOND_RAD = 1.0 / (3_600.0 * DEG_PER_RAD)
 
 
@@ -40,24 +39,24 @@ class UnitScale(NamedTuple):
 def _epson(name: str, dps: float, thousandths_g: float, rate_hz: float) -> UnitScale:
     """Return the scale of a unit whose counts are rates: over a sample of its own rate."""
     counts = 65_536.0 * rate_hz
-    return UnitScale(name, dps / DEG_PER_RAD / counts, 1e-3 * thousandths_g * _STANDARD_G / counts)
+    return UnitScale(name, dps / DEG_PER_RAD / counts, 1e-3 * thousandths_g * MPS2_PER_G / counts)
 
 
 _HONEYWELL = 2.0**-33
 SCALES: Mapping[int, UnitScale] = MappingProxyType(
     {
-        1: UnitScale("HG1700 AG11", _HONEYWELL, 2.0**-27 * _FOOT_M),
-        4: UnitScale("HG1700 AG17", _HONEYWELL, 2.0**-26 * _FOOT_M),
-        5: UnitScale("HG1900 CA29", _HONEYWELL, 2.0**-27 * _FOOT_M),
+        1: UnitScale("HG1700 AG11", _HONEYWELL, 2.0**-27 * M_PER_FOOT),
+        4: UnitScale("HG1700 AG17", _HONEYWELL, 2.0**-26 * M_PER_FOOT),
+        5: UnitScale("HG1900 CA29", _HONEYWELL, 2.0**-27 * M_PER_FOOT),
         8: UnitScale("LN-200", 2.0**-19, 2.0**-14),
-        11: UnitScale("HG1700 AG58", _HONEYWELL, 2.0**-27 * _FOOT_M),
-        12: UnitScale("HG1700 AG62", _HONEYWELL, 2.0**-26 * _FOOT_M),
+        11: UnitScale("HG1700 AG58", _HONEYWELL, 2.0**-27 * M_PER_FOOT),
+        12: UnitScale("HG1700 AG62", _HONEYWELL, 2.0**-26 * M_PER_FOOT),
         13: UnitScale("iIMU-FSAS", 0.1 * 2.0**-8 * _ARCSECOND_RAD, 0.05 * 2.0**-15),
         16: UnitScale("KVH CPT", 0.1 / (3_600.0 * 256.0), 0.05 * 2.0**-15),
-        20: UnitScale("HG1930 AA99", _HONEYWELL, 2.0**-27 * _FOOT_M),
+        20: UnitScale("HG1930 AA99", _HONEYWELL, 2.0**-27 * M_PER_FOOT),
         26: UnitScale("ISA-100C", 1e-9, 2e-8),
-        27: UnitScale("HG1900 CA50", _HONEYWELL, 2.0**-27 * _FOOT_M),
-        28: UnitScale("HG1930 CA50", _HONEYWELL, 2.0**-27 * _FOOT_M),
+        27: UnitScale("HG1900 CA50", _HONEYWELL, 2.0**-27 * M_PER_FOOT),
+        28: UnitScale("HG1930 CA50", _HONEYWELL, 2.0**-27 * M_PER_FOOT),
         31: UnitScale("ADIS16488", 720.0 * 2.0**-31 / DEG_PER_RAD, 200.0 * 2.0**-31),
         32: UnitScale("STIM300", 2.0**-21 / DEG_PER_RAD, 2.0**-22),
         33: UnitScale("KVH 1750", 0.1 / (3_600.0 * 256.0), 0.05 * 2.0**-15),

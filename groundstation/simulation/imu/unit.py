@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.attitude import rotation_n_from_b
 from groundstation.base.records import BoolArray
+from groundstation.base.units import MPS2_PER_G
 from groundstation.simulation.imu.imu_class import ImuClass
 from groundstation.simulation.imu.motion import Motion, exact_increments, true_states
 from groundstation.simulation.imu.settings import ImuSettings, MountingSettings, StampSettings, VibrationSettings
@@ -14,7 +15,6 @@ from groundstation.simulation.processes import gauss_markov
 from groundstation.simulation.scenario import LogInterval
 
 FloatArray = NDArray[np.float64]
-STANDARD_GRAVITY_MPS2 = 9.80665
 SECONDS_PER_HOUR = 3600.0
 TONES = (1.0, 1.37, 2.13)  # of a vibration, times its frequency
 
@@ -37,7 +37,7 @@ def draw_errors(
     unit: ImuClass, rng: np.random.Generator, count: int, settings: ImuSettings
 ) -> tuple[SensorErrors, SensorErrors]:
     """Draw the errors of the gyros and of the accelerometers of one unit of a class."""
-    micro_g = 1e-6 * STANDARD_GRAVITY_MPS2
+    micro_g = 1e-6 * MPS2_PER_G
     dph = np.deg2rad(1.0 / SECONDS_PER_HOUR)
     factor, step_s = settings.error_factor, 1.0 / settings.rate_hz
     gyro = _draw(

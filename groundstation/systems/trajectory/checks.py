@@ -66,7 +66,6 @@ def held_out(estimate: Estimate) -> tuple[HeldOutRow, ...]:
     windows = np.column_stack([starts, starts + HELD_S])
     done = without(estimate, windows)
     away = hidden(base.plan, windows)
-    epoch = np.repeat(np.arange(len(times)), np.diff(base.plan.schedule.seen))
     noise = estimate.problem.noise(estimate.model)
     rows = []
     for kind, horizontal, vertical, unit in (
@@ -80,7 +79,7 @@ def held_out(estimate: Estimate) -> tuple[HeldOutRow, ...]:
             z, variance = base.linear.z[at], base.plan.seen.variance[of, axis]
             columns, h = base.linear.columns[at], base.linear.h[at]
             near = columns < KEPT_ROWS
-            e = epoch[of][:, None]
+            e = base.plan.epoch[of][:, None]
             x = np.where(near, done.x[e, np.minimum(columns, KEPT_ROWS - 1)], 0.0)
             spread = np.where(near, done.variance[e, np.minimum(columns, KEPT_ROWS - 1)], 0.0)
             error = (h * x).sum(axis=1) - z

@@ -7,24 +7,23 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from groundstation.base.angles import wrap_180, wrap_360
 from groundstation.base.errors import NotAssessableError
 from groundstation.systems.trajectory import observations, slip, still
 from groundstation.systems.trajectory.fit import NUMBERS, Fit, Number, fit_model
 from groundstation.systems.trajectory.fix_motion import motion_of
-from groundstation.systems.trajectory.forward import run_forward
 from groundstation.systems.trajectory.inputs import GnssFixes, ImuIncrements
 from groundstation.systems.trajectory.model import Model, StartSigmas, gate
 from groundstation.systems.trajectory.observations import Observations
 from groundstation.systems.trajectory.passes import (
-    NOTHING_HELD,
     OWN_ESTIMATE,
-    PATTERN,
     Pass,
     Plan,
     Samples,
     Start,
     at_line,
     fill_gaps,
+    filter_epochs,
     lay_out,
     likelihood_of,
     line_of,
@@ -194,23 +193,8 @@ def hypotheses_of(problem: Problem, model: Model, rules: Gate) -> tuple[Hypothes
     room = linear_room(plan)
 
     def run(begin: int, end: int, now: Now, work: Room) -> float:
-        return run_forward(
-            problem.samples.imu,
-            plan.schedule,
-            plan.seen,
-            noise,
-            rules,
-            PATTERN,
-            NOTHING_HELD,
-            OWN_ESTIMATE,
-            True,
-            True,
-            begin,
-            end,
-            now,
-            work,
-            room,
-            nothing_kept(),
+        return filter_epochs(
+            problem.samples, plan, noise, rules, OWN_ESTIMATE, (begin, end), now, work, room, nothing_kept()
         )
 
     runs = []
@@ -226,7 +210,7 @@ def hypotheses_of(problem: Problem, model: Model, rules: Gate) -> tuple[Hypothes
     found.sort(key=lambda one: -one.likelihood)
     kept: list[Hypothesis] = []
     for one in found:
-        apart = [abs((one.end_heading_deg - other.end_heading_deg + 180.0) % 360.0 - 180.0) for other in kept]
+        apart = [abs(float(wrap_180(one.end_heading_deg - other.end_heading_deg))) for other in kept]
         if all(angle > SAME_HEADING_DEG for angle in apart):
             kept.append(one)
     return tuple(kept)
@@ -234,7 +218,7 @@ def hypotheses_of(problem: Problem, model: Model, rules: Gate) -> tuple[Hypothes
 
 def heading_of(nav: FloatArray) -> float:
     """Return the heading of an estimate, deg."""
-    return float(np.degrees(angles_of(nav[None, 6:])[2][0]) % 360.0)
+    return float(wrap_360(np.degrees(angles_of(nav[None, 6:])[2][0])))
 
 
 def _first_motion_s(gnss: GnssFixes, begin_s: float) -> float:
@@ -253,7 +237,6 @@ def settle(problem: Problem, model: Model, rules: Gate, start: Start, rounds: in
         start = done.start
         value, prior = start.value.copy(), start.prior.copy()
         for at, by in ((LAT, late), (LAG, lag)):
-            value[at] -= by
             prior[at] = -(problem.latency_s if at == LAT else problem.lag_s) - by
             value[at] = 0.0
         start = replace(start, value=value, prior=prior)
@@ -342,9 +325,9 @@ def estimate(
         model = found.model
     problem, start, done = settle(problem, model, rules, problem.restarted(start, model), SETTLE_ROUNDS)
     start, done = _at(problem, model, rules, start)
-    travel = slip.direction_of_travel(smoothed_track(problem.samples, done))
+    track = smoothed_track(problem.samples, done)
+    travel = slip.direction_of_travel(track)
     if may_roll and travel.does_roll:
-        track = smoothed_track(problem.samples, done)
         seen = observations.joined([problem.seen, slip.observations_of(track)])
         problem = replace(problem, seen=seen, has_slip=True)
         value = start.value.copy()

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.systems.trajectory.answer import AgainstOwnTrack, OutageRow, RaisedSigma
 from groundstation.systems.trajectory.outages import LENGTHS_S, Outages
 from groundstation.systems.trajectory.solution import FloatArray, TrackOfStates
@@ -11,7 +12,6 @@ from groundstation.systems.trajectory.solution import FloatArray, TrackOfStates
 WANTED = 0.95
 LEAST_WANTED = 0.9  # of the outages of one length
 FEW = 5  # outages below which nothing is told of sigmas
-NORMAL_95_OF_3 = 1.959964
 LONG_S = 30.0  # outages that show an attitude
 
 
@@ -60,7 +60,7 @@ def raised(
     why_tilt = why_heading = ""
     if len(outages) >= FEW:
         ratio = np.abs(outages.velocity_ratio).ravel()
-        velocity = max(1.0, _quantile(ratio, WANTED) / NORMAL_95_OF_3)
+        velocity = max(1.0, _quantile(ratio, WANTED) / NORMAL_95)
         long = outages.length_s >= LONG_S
         if long.sum() >= FEW:
             changes, expected = outages.attitude[long] ** 2, outages.attitude_variance[long]

@@ -1,9 +1,10 @@
 """Numbers of the model: noise of the unit, errors of GNSS, sigmas at the start."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from groundstation.base.units import MPS2_PER_G
 from groundstation.systems.trajectory.observations import Observations
 from groundstation.systems.trajectory.states import (
     BA,
@@ -28,7 +29,7 @@ from groundstation.systems.trajectory.states import (
     Noise,
 )
 
-DEG, STANDARD_GRAVITY_MPS2 = np.pi / 180.0, 9.80665
+DEG = np.pi / 180.0
 HOUR = 3600.0
 
 
@@ -40,7 +41,7 @@ class Model:
     ----------
     gyro_noise_deg_rth, accel_noise_mps_rth : float
         Angle and velocity random walk, deg and m/s in the square root of an hour.
-    gyro_walk_deg_rth3, accel_walk_mg_rth : float
+    gyro_walk_dps_rth, accel_walk_mg_rth : float
         Random walk of the biases: deg/s, and mg, in the square root of an hour.
     rate_noise : float
         Noise that grows with the rate: rad in the square root of (rad2/s).
@@ -97,7 +98,7 @@ class Model:
                     (self.gyro_noise_deg_rth * DEG / root) ** 2,
                     (self.accel_noise_mps_rth / root) ** 2,
                     (self.gyro_walk_dps_rth * DEG / root) ** 2,
-                    (self.accel_walk_mg_rth * 1e-3 * STANDARD_GRAVITY_MPS2 / root) ** 2,
+                    (self.accel_walk_mg_rth * 1e-3 * MPS2_PER_G / root) ** 2,
                     self.rate_noise**2,
                     (self.slip_walk_deg_rts * DEG) ** 2,
                 ]
@@ -146,7 +147,7 @@ class StartSigmas:
         """
         v = np.zeros(STATES)
         v[BG : BG + 3] = (self.gyro_bias_dps * DEG) ** 2
-        v[BA : BA + 3] = (self.accel_bias_mg * 1e-3 * STANDARD_GRAVITY_MPS2) ** 2
+        v[BA : BA + 3] = (self.accel_bias_mg * 1e-3 * MPS2_PER_G) ** 2
         v[SG : SG + 3] = (model.gyro_imperfection * self.gyro_scale) ** 2
         v[MG : MG + 6] = (model.gyro_imperfection * self.misalignment_deg * DEG) ** 2
         v[SA : SA + 3] = (model.accel_imperfection * self.accel_scale) ** 2
@@ -165,8 +166,3 @@ def gate(sigmas: float = 5.0) -> Gate:
     """Return the rules of the gate."""
     opened = np.concatenate([np.full(3, 5.0**2), np.full(3, 2.0**2), np.full(2, (3.0 * DEG) ** 2), [(10.0 * DEG) ** 2]])
     return Gate(sigmas**2, 10, opened)
-
-
-def names_of(model: Model) -> tuple[str, ...]:
-    """Return the names of the numbers of a model."""
-    return tuple(item.name for item in fields(model))

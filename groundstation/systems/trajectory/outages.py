@@ -100,17 +100,10 @@ def _of_length(estimate: Estimate, length_s: float) -> list[tuple[float, ...]]:
 def _is_fit(estimate: Estimate, start_s: float, end_s: float) -> bool:
     """Tell whether GNSS is there and the vehicle moves."""
     plan = estimate.result.plan
-    valid_s = _valid_s(plan)
-    inside = (valid_s >= start_s) & (valid_s < end_s)
+    inside = (plan.valid_s >= start_s) & (plan.valid_s < end_s)
     fixes = inside & (plan.seen.kind == POSITION)
     still = inside & (plan.seen.kind == STILL)
     return bool(fixes.sum() >= 2 and still.sum() < MOVING_SHARE * (end_s - start_s))
-
-
-def _valid_s(plan: Plan) -> FloatArray:
-    """Return the times of validity of the measurements of a plan."""
-    epoch = np.repeat(np.arange(len(plan.epoch_s)), np.diff(plan.schedule.seen))
-    return np.asarray(plan.epoch_s[epoch] - plan.seen.back_s)
 
 
 def hidden(plan: Plan, windows: FloatArray) -> BoolArray:
@@ -118,9 +111,8 @@ def hidden(plan: Plan, windows: FloatArray) -> BoolArray:
 
     GNSS, and the standstill that it showed.
     """
-    valid_s = _valid_s(plan)
-    at = np.searchsorted(windows[:, 0], valid_s, side="right") - 1
-    inside = (at >= 0) & (valid_s < windows[np.maximum(at, 0), 1])
+    at = np.searchsorted(windows[:, 0], plan.valid_s, side="right") - 1
+    inside = (at >= 0) & (plan.valid_s < windows[np.maximum(at, 0), 1])
     return np.asarray(inside & np.isin(plan.seen.kind, (POSITION, VELOCITY, STILL, NO_RATE)))
 
 

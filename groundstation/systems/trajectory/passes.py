@@ -1,6 +1,7 @@
 """A pass over a log: filter forward, smoother back, states at the times of the samples."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -113,6 +114,16 @@ class Plan:
     seen: Seen
     order: Int64Array  # of the observations, as the pass uses them
     epoch_s: FloatArray
+
+    @cached_property
+    def epoch(self) -> Int64Array:
+        """Epoch of each measurement, shape (m,)."""
+        return np.repeat(np.arange(len(self.epoch_s)), np.diff(self.schedule.seen))
+
+    @cached_property
+    def valid_s(self) -> FloatArray:
+        """Time of validity of each measurement, shape (m,)."""
+        return np.asarray(self.epoch_s[self.epoch] - self.seen.back_s)
 
 
 def output_samples(samples: Samples, first: int, rate_hz: float = OUTPUT_HZ) -> Int64Array:
@@ -284,6 +295,42 @@ class Pass:
 PATTERN = transition_pattern()
 
 
+def filter_epochs(
+    samples: Samples,
+    plan: Plan,
+    noise: Noise,
+    gate: Gate,
+    line: Line,
+    span: tuple[int, int],
+    now: Now,
+    room: Room,
+    linear: Linear,
+    solved: Solved,
+    carries: bool = True,
+) -> float:
+    """Filter the epochs of a span and return the log-likelihood; no state is held.
+
+    ``now``, ``room``, ``linear`` and ``solved`` are filled. Without carrying, ``linear`` is known.
+    """
+    return run_forward(
+        samples.imu,
+        plan.schedule,
+        plan.seen,
+        noise,
+        gate,
+        PATTERN,
+        NOTHING_HELD,
+        line,
+        carries,
+        True,
+        *span,
+        now,
+        room,
+        linear,
+        solved,
+    )
+
+
 def run_pass(
     samples: Samples,
     plan: Plan,
@@ -310,24 +357,7 @@ def run_pass(
     linear = linear_room(plan) if known is None else known
     solved = all_kept(plan)
     now, room = start.now(), make_room(start.prior)
-    likelihood = run_forward(
-        samples.imu,
-        plan.schedule,
-        plan.seen,
-        noise,
-        gate,
-        PATTERN,
-        NOTHING_HELD,
-        line,
-        known is None,
-        True,
-        0,
-        epochs,
-        now,
-        room,
-        linear,
-        solved,
-    )
+    likelihood = filter_epochs(samples, plan, noise, gate, line, (0, epochs), now, room, linear, solved, known is None)
     x, variance = np.zeros((epochs, KEPT_ROWS)), np.zeros((epochs, KEPT_ROWS))
     plane = np.zeros(epochs)
     first, square = np.zeros(STATES), [np.zeros((STATES, STATES)) for _ in range(2)]
@@ -379,24 +409,8 @@ def likelihood_of(
     The linearisation is known.
     """
     last = len(plan.epoch_s) if end is None else end
-    return run_forward(
-        samples.imu,
-        plan.schedule,
-        plan.seen,
-        noise,
-        gate,
-        PATTERN,
-        NOTHING_HELD,
-        OWN_ESTIMATE,
-        False,
-        True,
-        0,
-        last,
-        start.now(),
-        make_room(start.prior),
-        known,
-        nothing_kept(),
-    )
+    now, room = start.now(), make_room(start.prior)
+    return filter_epochs(samples, plan, noise, gate, OWN_ESTIMATE, (0, last), now, room, known, nothing_kept(), False)
 
 
 def moved(start: Start, correction: FloatArray) -> Start:

@@ -13,10 +13,10 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import north_east_m
 from groundstation.base.records import Int64Array
+from groundstation.base.units import MPS2_PER_G
 from groundstation.systems.trajectory.inputs import GnssFixes, ImuIncrements
 from groundstation.systems.trajectory.mounting_settings import MountingSettings
 
-GRAVITY_MPS2 = 9.80665
 FIX_GAP_STEPS = 1.6  # of the usual step: a longer one ends a span
 IMU_GAP_S, IMU_GAP_INTERVALS = 0.2, 3.5
 QUIET_MPS2 = 0.3
@@ -219,6 +219,6 @@ def spans_of(steps: Steps, sums: Sums, settings: MountingSettings) -> Spans:
     first = np.array(kept, dtype=np.int64)
     index = first[:, None] + np.arange(count)[None, :]
     wanted = steps.change_mps[index]
-    wanted[..., 2] -= GRAVITY_MPS2 * steps.length_s[index]
+    wanted[..., 2] -= MPS2_PER_G * steps.length_s[index]
     node_s = np.concatenate([steps.start_s[index], steps.end_s[index[:, -1:]]], axis=1)
     return Spans(first, wanted, steps.velocity_mps[index], node_s)

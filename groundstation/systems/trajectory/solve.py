@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from groundstation.base.angles import wrap_360
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.results.gates import Gate, judged_gate
@@ -245,7 +246,7 @@ def _are_two(hypotheses: tuple[HeadingHypothesis, ...], settings: TrajectorySett
 def _other_heading(track: TrackOfStates, hypotheses: tuple[HeadingHypothesis, ...]) -> FloatArray:
     """Return the heading of the runner-up: the best one turned by the difference at the end."""
     turn = hypotheses[1].end_heading_deg - hypotheses[0].end_heading_deg
-    return np.asarray((track.heading_deg + turn) % 360.0)
+    return wrap_360(track.heading_deg + turn)
 
 
 def _gates(

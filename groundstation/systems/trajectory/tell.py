@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from groundstation.base.units import MPS2_PER_G
 from groundstation.systems.trajectory.answer import ARM, LATENCY, VELOCITY_LAG, NoiseRow, TrajectoryParameter
 from groundstation.systems.trajectory.arrays import TrajectoryBiases, TrajectoryOutages, TrajectoryResiduals
 from groundstation.systems.trajectory.estimate import Estimate
 from groundstation.systems.trajectory.figures import rows_shown
-from groundstation.systems.trajectory.model import DEG, STANDARD_GRAVITY_MPS2, Model
+from groundstation.systems.trajectory.model import DEG, Model
 from groundstation.systems.trajectory.observe import NO_ROW
 from groundstation.systems.trajectory.outages import Outages
 from groundstation.systems.trajectory.solution import FloatArray
@@ -25,12 +26,12 @@ from groundstation.systems.trajectory.states import (
     POSITION,
     SA,
     SG,
-    STATES,
+    SLOW,
     VELOCITY,
 )
 
 OBSERVABLE = 0.6  # of the sigma at the start: what keeps more of it was not seen
-MG_PER = 1e-3 * STANDARD_GRAVITY_MPS2
+MG_PER = 1e-3 * MPS2_PER_G
 NOISES = (
     ("gyro_noise_deg_rth", "gyro noise", "deg/sqrt(h)"),
     ("accel_noise_mps_rth", "accelerometer noise", "m/s/sqrt(h)"),
@@ -100,9 +101,7 @@ def parameter_rows(estimate: Estimate) -> tuple[TrajectoryParameter, ...]:
 
 def residuals_of(estimates: tuple[Estimate, ...]) -> TrajectoryResiduals:
     """Return GNSS minus the smoothed solution at the antenna."""
-    parts = []
-    for one in estimates:
-        parts.append(_residuals(one))
+    parts = [_residuals(one) for one in estimates]
     time_s, place, moving, used = (np.concatenate([part[i] for part in parts]) for i in range(4))
     rows = rows_shown(time_s)
     return TrajectoryResiduals(
@@ -122,18 +121,13 @@ def _residuals(estimate: Estimate) -> tuple[FloatArray, FloatArray, FloatArray, 
     """Return times, residuals of position and of velocity, and what was used."""
     done = estimate.result
     kind, linear = done.plan.seen.kind, done.linear
-    epoch = np.repeat(np.arange(len(done.plan.epoch_s)), np.diff(done.plan.schedule.seen))
-    constants = done.constants - linear.value[-1]
-    x = np.zeros((len(done.plan.epoch_s), STATES))
-    x[:] = constants
+    epoch, valid_s = done.plan.epoch, done.plan.valid_s
+    x = np.tile(done.constants - linear.value[-1], (len(done.plan.epoch_s), 1))
     x[:, :KEPT_ROWS] = done.x
-    for at in range(LAG + 1, MNT):
-        x[:, at] = 0.0
-    scalars = 3 * len(kind)
+    x[:, SLOW:MNT] = 0.0
     predicted = (linear.h * np.take_along_axis(x[np.repeat(epoch, 3)], linear.columns, axis=1)).sum(axis=1)
-    error = np.where(np.abs(linear.z) < 0.5 * NO_ROW, linear.z - predicted, np.nan)[:scalars].reshape(-1, 3)
+    error = np.where(np.abs(linear.z) < 0.5 * NO_ROW, linear.z - predicted, np.nan).reshape(-1, 3)
     used = done.solved.mark.reshape(-1, 3).max(axis=1) == 1
-    valid_s = done.plan.epoch_s[epoch] - done.plan.seen.back_s
     position, velocity = np.flatnonzero(kind == POSITION), np.flatnonzero(kind == VELOCITY)
     beside = np.full((len(position), 3), np.nan)
     if len(velocity):

@@ -4,9 +4,10 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray
+from groundstation.base.units import MPS2_PER_G
 from groundstation.systems.trajectory.inputs import ImuIncrements
 from groundstation.systems.trajectory.mounting_settings import MountingSettings
-from groundstation.systems.trajectory.short_spans import GRAVITY_MPS2, QUIET_MPS2, Steps
+from groundstation.systems.trajectory.short_spans import QUIET_MPS2, Steps
 
 STUCK_S, STUCK_SHARE = 10.0, 0.2  # of the log: a shorter one is a gap of the sensor, which the ledger tells
 SAME = 1e-5  # relative: increments are logged in single precision
@@ -59,15 +60,15 @@ def wrong_force(steps: Steps, settings: MountingSettings) -> str:
     sizes = [float(np.median(size[part])) for part in (calm, known) if part.sum() >= FEWEST_CALM]
     if not sizes:
         return ""
-    found = min(sizes, key=lambda one: abs(np.log(max(one, 1e-9) / GRAVITY_MPS2)))
+    found = min(sizes, key=lambda one: abs(np.log(max(one, 1e-9) / MPS2_PER_G)))
     low, high = settings.gravity_range_mps2
     if low <= found <= high:
         return ""
-    told = f"accelerometers show {found:.3g} where gravity is {GRAVITY_MPS2:.2f} m/s2"
-    if low <= found * GRAVITY_MPS2 <= high:
+    told = f"accelerometers show {found:.3g} where gravity is {MPS2_PER_G:.2f} m/s2"
+    if low <= found * MPS2_PER_G <= high:
         return f"{told}: they are in g, not in m/s2"
-    if low <= found / GRAVITY_MPS2 <= high:
+    if low <= found / MPS2_PER_G <= high:
         return f"{told}: they are multiplied by g twice"
-    if found < 0.2 * GRAVITY_MPS2:
+    if found < 0.2 * MPS2_PER_G:
         return f"{told}: gravity has been taken off, or they are not specific force"
     return f"{told}: wrong units, scale or a bias beyond use"
