@@ -6,7 +6,6 @@ Sizes that the file declares are not believed: what comes out is counted, and st
 file still gives is kept.
 """
 
-import io
 import os
 import tempfile
 import weakref
@@ -19,6 +18,7 @@ import zstandard
 
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage
+from groundstation.readers.positioned import Positioned
 
 GZIP_MAGIC, ZSTD_MAGIC = b"\x1f\x8b\x08", b"\x28\xb5\x2f\xfd"
 MAX_RATIO = 200  # a recorded flight shrinks 2 to 20 times, a table of constants some 100 times
@@ -110,29 +110,14 @@ def unnamed_file() -> BinaryIO:
     return file
 
 
-class FileWindow(io.RawIOBase):
+class FileWindow(Positioned):
     """A read-only view of a shared file with a position of its own."""
 
     def __init__(self, file: BinaryIO, size: int) -> None:
-        self._file, self._size, self._at = file, size, 0
+        self._file, self._size = file, size
 
-    def readable(self) -> bool:
-        """True."""
-        return True
-
-    def seekable(self) -> bool:
-        """True."""
-        return True
-
-    def tell(self) -> int:
-        """Position from the start."""
-        return self._at
-
-    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """Move to a position and return it."""
-        base = {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._size}[whence]
-        self._at = max(0, base + offset)
-        return self._at
+    def _length(self) -> int:
+        return self._size
 
     def readinto(self, buffer: Any) -> int:
         """Fill ``buffer`` from the position on and return the number of bytes."""

@@ -10,13 +10,14 @@ from typing import Any, BinaryIO
 
 from groundstation.base.records import Damage
 from groundstation.readers.dialect import DELIMITERS
-from groundstation.readers.source import HEAD_BYTES, Source
+from groundstation.readers.positioned import Positioned
+from groundstation.readers.source import HEAD_BYTES, MadeSource, Source
 
 _LOOKED_AT = 1 << 16  # bytes at the end of a file and at the beginning of the next in which lines are looked for
 
 
 @dataclass(frozen=True)
-class JoinedSource(Source):
+class JoinedSource(MadeSource):
     """Files that were written one after the other, seen as one file.
 
     Their bytes follow one another.
@@ -37,11 +38,6 @@ class JoinedSource(Source):
     def size(self) -> int:
         """Bytes of all files, decompressed."""
         return self._ends[-1]
-
-    @property
-    def compression(self) -> str:
-        """Empty text: the files are decompressed one by one."""
-        return ""
 
     @cached_property
     def head(self) -> bytes:
@@ -80,7 +76,7 @@ class JoinedSource(Source):
 
 
 @dataclass(frozen=True)
-class BytesSource(Source):
+class BytesSource(MadeSource):
     """Bytes in memory, under the name of a file."""
 
     content: bytes = b""
@@ -89,11 +85,6 @@ class BytesSource(Source):
     def size(self) -> int:
         """Number of bytes."""
         return len(self.content)
-
-    @property
-    def compression(self) -> str:
-        """Empty text: nothing is compressed."""
-        return ""
 
     @property
     def head(self) -> bytes:
@@ -110,30 +101,15 @@ class BytesSource(Source):
         return io.BytesIO(self.content)
 
 
-class _Chain(io.RawIOBase):
+class _Chain(Positioned):
     """Read-only view of consecutive files, each opened when it is first read."""
 
     def __init__(self, pieces: "Sequence[Source | bytes]", ends: Sequence[int]) -> None:
-        self._pieces, self._ends, self._at = pieces, ends, 0
+        self._pieces, self._ends = pieces, ends
         self._open: tuple[int, BinaryIO] | None = None
 
-    def readable(self) -> bool:
-        """True."""
-        return True
-
-    def seekable(self) -> bool:
-        """True."""
-        return True
-
-    def tell(self) -> int:
-        """Position from the start."""
-        return self._at
-
-    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """Move to a position and return it."""
-        base = {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._ends[-1]}[whence]
-        self._at = max(0, base + offset)
-        return self._at
+    def _length(self) -> int:
+        return self._ends[-1]
 
     def readinto(self, buffer: Any) -> int:
         """Fill ``buffer`` from the position on and return the number of bytes.

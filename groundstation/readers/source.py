@@ -108,6 +108,22 @@ class Source:
 
 
 @dataclass(frozen=True)
+class MadeSource(Source):
+    """Source whose bytes are made of others: what is read is decompressed."""
+
+    @property
+    def compression(self) -> str:
+        """Empty."""
+        return ""
+
+    @cached_property
+    def head(self) -> bytes:
+        """The first :data:`HEAD_BYTES` bytes, as they are read."""
+        with self.open() as stream:
+            return stream.read(HEAD_BYTES)
+
+
+@dataclass(frozen=True)
 class Claim:
     """A reader's statement that it can read a source.
 

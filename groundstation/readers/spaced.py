@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from groundstation.base.records import BoolArray
 from groundstation.readers.compressed import FileWindow, unnamed_file
-from groundstation.readers.source import HEAD_BYTES, Source
+from groundstation.readers.positioned import Positioned
+from groundstation.readers.source import HEAD_BYTES, MadeSource, Source
 
 if TYPE_CHECKING:
     from _typeshed import WriteableBuffer
@@ -26,7 +27,7 @@ _PIECE_BYTES = 1 << 20
 
 
 @dataclass(frozen=True)
-class SpacedSource(Source):
+class SpacedSource(MadeSource):
     """Another source with a tab before each cell.
 
     Parameters
@@ -47,11 +48,6 @@ class SpacedSource(Source):
         """Size in bytes."""
         return self.whole.size
 
-    @property
-    def compression(self) -> str:
-        """Empty: what is read here is decompressed."""
-        return ""
-
     @cached_property
     def head(self) -> bytes:
         """The first bytes, with tabs."""
@@ -66,26 +62,15 @@ class SpacedSource(Source):
         return io.BufferedReader(_Tabs(self.whole.open(), self.cells, self.joined), _PIECE_BYTES)
 
 
-class _Tabs(io.RawIOBase):
+class _Tabs(Positioned):
     """Bytes of a stream with a tab before each cell, from any place on."""
 
     def __init__(self, stream: BinaryIO, cells: int, joined: tuple[int, ...]) -> None:
-        self._stream, self._cells, self._joined, self._at = stream, cells, joined, 0
+        self._stream, self._cells, self._joined = stream, cells, joined
         self._from, self._ready = 0, b""  # whole lines that are converted, and where they begin
 
-    def readable(self) -> bool:
-        return True
-
-    def seekable(self) -> bool:
-        return True
-
-    def tell(self) -> int:
-        return self._at
-
-    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        base = {io.SEEK_SET: 0, io.SEEK_CUR: self._at}.get(whence)
-        self._at = max(0, (self._stream.seek(0, io.SEEK_END) if base is None else base) + offset)
-        return self._at
+    def _length(self) -> int:
+        return self._stream.seek(0, io.SEEK_END)
 
     def close(self) -> None:
         self._stream.close()
@@ -160,7 +145,7 @@ def _ends_line(characters: NDArray[np.uint8]) -> BoolArray:
 
 
 @dataclass(frozen=True)
-class FixedSource(Source):
+class FixedSource(MadeSource):
     """Another source whose columns have fixed widths, with a tab between the columns.
 
     A line that is shorter than the columns has empty cells; what stands behind the last column belongs to it.
@@ -173,17 +158,6 @@ class FixedSource(Source):
     def size(self) -> int:
         """Size in bytes, tabs counted."""
         return self._written[1]
-
-    @property
-    def compression(self) -> str:
-        """Empty: what is read here is decompressed."""
-        return ""
-
-    @cached_property
-    def head(self) -> bytes:
-        """The first bytes, with tabs."""
-        with self.open() as stream:
-            return stream.read(HEAD_BYTES)
 
     def open(self) -> BinaryIO:
         """Open for reading bytes with tabs."""

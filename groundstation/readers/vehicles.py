@@ -21,9 +21,10 @@ from groundstation.readers.cells import trimmed
 from groundstation.readers.compressed import unnamed_file
 from groundstation.readers.dialect import Dialect
 from groundstation.readers.losses import Losses
+from groundstation.readers.positioned import Positioned
 from groundstation.readers.rows import RowBlock, RowScanner
 from groundstation.readers.sections import MOST, TableSection
-from groundstation.readers.source import HEAD_BYTES, Source
+from groundstation.readers.source import MadeSource, Source
 
 if TYPE_CHECKING:
     from _typeshed import WriteableBuffer
@@ -41,7 +42,7 @@ class _Chunk:
 
 
 @dataclass(frozen=True)
-class GroupedSource(Source):
+class GroupedSource(MadeSource):
     """Rows of a table, vehicle by vehicle."""
 
     file: BinaryIO
@@ -52,42 +53,20 @@ class GroupedSource(Source):
         """Size in bytes."""
         return sum(one.size for one in self.chunks)
 
-    @property
-    def compression(self) -> str:
-        """Empty."""
-        return ""
-
-    @property
-    def head(self) -> bytes:
-        """The first bytes."""
-        with self.open() as stream:
-            return stream.read(HEAD_BYTES)
-
     def open(self) -> BinaryIO:
         """Open the rows, from the first on."""
         return io.BufferedReader(_Chunks(self.file, self.chunks))
 
 
-class _Chunks(io.RawIOBase):
+class _Chunks(Positioned):
     """Pieces of a file in another order."""
 
     def __init__(self, file: BinaryIO, chunks: Sequence[_Chunk]) -> None:
-        self._file, self._chunks, self._at = file, chunks, 0
+        self._file, self._chunks = file, chunks
         self._ends = np.cumsum([one.size for one in chunks], dtype=np.int64)
 
-    def readable(self) -> bool:
-        return True
-
-    def seekable(self) -> bool:
-        return True
-
-    def tell(self) -> int:
-        return self._at
-
-    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        end = int(self._ends[-1]) if len(self._ends) else 0
-        self._at = max(0, {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: end}[whence] + offset)
-        return self._at
+    def _length(self) -> int:
+        return int(self._ends[-1]) if len(self._ends) else 0
 
     def readinto(self, buffer: "WriteableBuffer") -> int:
         view = memoryview(buffer).cast("B")
