@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from _typeshed import WriteableBuffer
 
 _BLANK, _TAB, _LF, _CR = 32, 9, 10, 13
+_NUMERIC = np.frombuffer(b"0123456789+-.", np.uint8)
 _BEFORE_BYTES = 1 << 16  # looked at before a place for the beginning of its line
 _PIECE_BYTES = 1 << 20
 
@@ -135,7 +136,9 @@ def tabbed(text: NDArray[np.uint8], cells: int = 0, joined: Sequence[int] = ()) 
         first = np.flatnonzero(np.append(True, line[1:] != line[:-1]))
         counts = np.diff(np.append(first, len(begins)))
         number = np.arange(len(begins)) - np.repeat(first, counts)
-        inside = (np.repeat(counts, counts) == cells - 1) & np.isin(number, joined)
+        # A row that is cut or torn has other cells, and must not look whole with its parts taken for columns.
+        is_part = (np.repeat(counts, counts) == cells - 1) | np.isin(text[begins], _NUMERIC)
+        inside = is_part & np.isin(number, joined)
         converted[begins[inside] - 1] = _BLANK
     return converted.tobytes()
 

@@ -42,6 +42,19 @@ def test_blanks_part_the_columns_and_degrees_minutes_seconds_are_one(tmp_path: P
     assert found.damage("dropped_rows").count == 1
 
 
+@pytest.mark.parametrize("end", ["", "\n 12  47 30 03.0  -122 15 33.0  1000\n"], ids=["cut", "torn"])
+@pytest.mark.parametrize("cells", range(1, 8))
+def test_a_part_of_a_row_is_never_taken_for_a_row(tmp_path: Path, cells: int, end: str) -> None:
+    head = "   t          lat            lon         h\n (s)   (+/-D M S)    (+/-D M S)      (m)\n"
+    whole = " 10  47 30 00.0  -122 15 36.0  1000\n"
+    part = "  ".join(["11", "47", "30", "01.0", "-122", "15", "35.0", "1000"][:cells])
+    found = read(tmp_path, f"{BLANKS}[columns]\n{PLACES}", head + whole + " " + part + end)
+    assert found.values("gnss", "longitude_deg") == pytest.approx(
+        [-122.26, -122 - 15 / 60 - 33 / 3600][: 1 + bool(end)]
+    )
+    assert found.damage("dropped_rows" if end else "truncated").count == 1
+
+
 def test_plain_degrees_of_the_same_column_have_a_cell_each(tmp_path: Path) -> None:
     found = read(tmp_path, f"{BLANKS}[columns]\n{PLACES}", "t lat lon h\n(s) (deg) (deg) (m)\n0\t47.5   -122.25\t1\n")
     assert found.values("gnss", "latitude_deg") == [47.5] and found.values("gnss", "longitude_deg") == [-122.25]
