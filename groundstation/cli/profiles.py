@@ -79,7 +79,9 @@ def new(
 @profiles.command(epilog=examples("profile"))
 @answers_with_exit_code
 def check(
-    profile: Annotated[Path, typer.Argument(help="A profile (TOML).", metavar="PROFILE", readable=False)],
+    profile: Annotated[
+        Path, typer.Argument(help="A profile (TOML), or the name of a shipped one.", metavar="PROFILE", readable=False)
+    ],
     table: Table,
     fail_on: FailOn = "none",
     quiet: Quiet = False,

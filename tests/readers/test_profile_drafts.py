@@ -429,3 +429,12 @@ def test_bad_tables_are_one_line(tmp_path: Path, write: Write) -> None:
             except GroundstationError as error:
                 assert "\n" not in str(error)
     assert drafts > 30
+
+
+def test_a_shipped_profile_is_checked_by_its_name(tmp_path: Path) -> None:
+    table = tmp_path / "track.txt"
+    table.write_text("# timestamp tx ty tz qx qy qz qw\n1714989600.0 0 0 0 0 0 0 1\n1714989600.1 1 0 0 0 0 0 1\n")
+    by_name = CliRunner().invoke(app, ["profile", "check", "tum", str(table)])
+    assert by_name.exit_code == 0 and "qw" in by_name.output
+    unknown = CliRunner().invoke(app, ["profile", "check", "no-such", str(table)])
+    assert unknown.exit_code == 2 and "no-such: no such file" in unknown.output

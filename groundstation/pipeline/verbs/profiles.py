@@ -12,7 +12,7 @@ from groundstation.readers.drafts.checked import ProfileCheck as ProfileCheck
 from groundstation.readers.drafts.checked import check_profile
 from groundstation.readers.drafts.draft import Draft as Draft
 from groundstation.readers.drafts.draft import draft_of, facts_of
-from groundstation.readers.profile import SHIPPED, Profile
+from groundstation.readers.profile import SHIPPED, Profile, known_as
 from groundstation.readers.source import Source
 from groundstation.results.files import write_text
 
@@ -55,7 +55,7 @@ def try_profile(profile: Path, table: Path) -> ProfileCheck:
     UnreadableLogError
         When the table has no header row of the profile, or cannot be read.
     """
-    return check_profile(_file(profile), _file(table))
+    return check_profile(_file(known_as(profile)), _file(table))
 
 
 def known_profiles() -> tuple[tuple[KnownProfile, ...], tuple[str, ...]]:
