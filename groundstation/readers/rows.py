@@ -49,7 +49,8 @@ class RowScanner:
     def __init__(self, source: Source, dialect: Dialect, losses: Losses) -> None:
         self._source, self._dialect, self._losses = source, dialect, losses
         self._next_line = dialect.first_line
-        self._left = None if dialect.end_byte is None else dialect.end_byte - dialect.first_byte
+        # Lines left out behind a header may lie behind the end of its rows.
+        self._left = None if dialect.end_byte is None else max(0, dialect.end_byte - dialect.first_byte)
         self._newline = b"\n" if b"\n" in source.head or b"\r" not in source.head else b"\r"
         self.ends_without_newline = False
         self.skipped: dict[int, str] = {}  # header and comment lines inside the file, by their numbers
