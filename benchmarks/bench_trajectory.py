@@ -44,6 +44,7 @@ from groundstation.simulation.imu.settings import ImuSettings, ReceiverSettings 
 from groundstation.simulation.imu.unit import STANDARD_GRAVITY_MPS2  # noqa: E402
 from groundstation.systems.trajectory.forward import run_forward  # noqa: E402
 from groundstation.systems.trajectory.inputs import GnssFixes, ImuIncrements  # noqa: E402
+from groundstation.systems.trajectory.layout import Plan, Samples, fill_gaps, lay_out  # noqa: E402
 from groundstation.systems.trajectory.model import Model, StartSigmas, gate  # noqa: E402
 from groundstation.systems.trajectory.observations import of_gnss  # noqa: E402
 from groundstation.systems.trajectory.passes import (  # noqa: E402
@@ -51,12 +52,8 @@ from groundstation.systems.trajectory.passes import (  # noqa: E402
     OWN_ESTIMATE,
     PATTERN,
     Pass,
-    Plan,
-    Samples,
     Start,
     at_line,
-    fill_gaps,
-    lay_out,
     line_of,
     linear_room,
     make_room,

@@ -13,18 +13,15 @@ from groundstation.systems.trajectory import observations, slip, still
 from groundstation.systems.trajectory.fit import NUMBERS, Fit, Number, fit_model
 from groundstation.systems.trajectory.fix_motion import motion_of
 from groundstation.systems.trajectory.inputs import GnssFixes, ImuIncrements
+from groundstation.systems.trajectory.layout import Plan, Samples, fill_gaps, lay_out
 from groundstation.systems.trajectory.model import Model, StartSigmas, gate
 from groundstation.systems.trajectory.observations import Observations
 from groundstation.systems.trajectory.passes import (
     OWN_ESTIMATE,
     Pass,
-    Plan,
-    Samples,
     Start,
     at_line,
-    fill_gaps,
     filter_epochs,
-    lay_out,
     likelihood_of,
     line_of,
     linear_room,

@@ -9,7 +9,8 @@ import numpy as np
 
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.systems.trajectory.estimate import Estimate
-from groundstation.systems.trajectory.passes import Pass, Plan, run_pass
+from groundstation.systems.trajectory.layout import Plan
+from groundstation.systems.trajectory.passes import Pass, run_pass
 from groundstation.systems.trajectory.states import (
     ATT,
     NAVIGATION,

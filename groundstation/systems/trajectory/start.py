@@ -4,8 +4,9 @@ import numpy as np
 
 from groundstation.systems.trajectory.fix_motion import motion_of
 from groundstation.systems.trajectory.inputs import GnssFixes
+from groundstation.systems.trajectory.layout import Samples
 from groundstation.systems.trajectory.model import DEG, StartSigmas
-from groundstation.systems.trajectory.passes import Samples, Start
+from groundstation.systems.trajectory.passes import Start
 from groundstation.systems.trajectory.states import ATT, POS, STATES, VEL, FloatArray, Noise
 
 HYPOTHESES = 12

@@ -5,8 +5,8 @@ import numpy as np
 from groundstation.base.records import BoolArray
 from groundstation.systems.trajectory.fix_motion import motion_of
 from groundstation.systems.trajectory.inputs import GnssFixes
+from groundstation.systems.trajectory.layout import Samples
 from groundstation.systems.trajectory.observations import Observations
-from groundstation.systems.trajectory.passes import Samples
 from groundstation.systems.trajectory.states import NO_RATE, STILL, FloatArray
 
 WINDOW_S = 1.0

@@ -7,8 +7,9 @@ import numpy as np
 from groundstation.base.angles import wrap_180, wrap_360
 from groundstation.base.geodesy import curvature_radii_m
 from groundstation.base.records import Int64Array
+from groundstation.systems.trajectory.layout import Samples, output_samples
 from groundstation.systems.trajectory.model import DEG
-from groundstation.systems.trajectory.passes import Pass, Samples, output_samples, turned
+from groundstation.systems.trajectory.passes import Pass, turned
 from groundstation.systems.trajectory.solution import TrackOfStates
 from groundstation.systems.trajectory.states import ATT, NAVIGATION, VEL, FloatArray
 

@@ -12,15 +12,13 @@ from groundstation.simulation.imu.motion import true_states
 from groundstation.simulation.imu.settings import ImuSettings
 from groundstation.systems.trajectory.forward import BLOCK, run_forward
 from groundstation.systems.trajectory.inputs import ImuIncrements
+from groundstation.systems.trajectory.layout import Plan, Samples, fill_gaps
 from groundstation.systems.trajectory.model import Model, gate
 from groundstation.systems.trajectory.passes import (
     NOTHING_HELD,
     OWN_ESTIMATE,
     PATTERN,
-    Plan,
-    Samples,
     Start,
-    fill_gaps,
     linear_room,
     make_room,
     moved,

@@ -11,8 +11,8 @@ from groundstation.simulation.imu.flight import ImuFlight, simulate_imu
 from groundstation.simulation.imu.motion import true_states
 from groundstation.systems.trajectory.estimate import Estimate, estimate
 from groundstation.systems.trajectory.inputs import FloatArray, GnssFixes, ImuIncrements
+from groundstation.systems.trajectory.layout import output_samples
 from groundstation.systems.trajectory.onboard_offsets import euler_deg
-from groundstation.systems.trajectory.passes import output_samples
 from groundstation.systems.trajectory.retime import on_a_line
 from groundstation.systems.trajectory.solution import TrackOfStates
 from groundstation.systems.trajectory.states import LAT
