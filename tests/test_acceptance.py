@@ -150,6 +150,7 @@ def test_a_folder_is_accepted_and_what_does_not_count_says_why(tmp_path: Path) -
     assert found.judgements[1].decision == "not flown" and "none flown" in " ".join(front(found).sentences)
 
 
+@pytest.mark.slow
 def test_flights_of_unknown_ins_are_taken_as_of_one(tmp_path: Path) -> None:
     """Without serial and aircraft 60 flights may all be of one INS: they show nothing of its type."""
     for number in range(60):

@@ -79,6 +79,7 @@ def test_a_log_that_takes_too_long_is_ended(tmp_path: Path, is_isolated: bool) -
     assert not multiprocessing.active_children()
 
 
+@pytest.mark.slow
 @LINUX
 @pytest.mark.parametrize("name", ["leaves_children", "leaves_children_and_hangs"])
 def test_no_child_outlives_its_log(tmp_path: Path, name: str) -> None:
@@ -141,6 +142,7 @@ def test_an_isolated_run_gives_what_any_other_gives_and_is_continued(tmp_path: P
     assert outcome.was_finished, "limits change no result"
 
 
+@pytest.mark.slow
 def test_checks_and_descriptions_are_those_of_this_process() -> None:
     logs, bounds = [SAMPLES / "taxi-damaged.csv", SAMPLES / "README.md"], ProcessLimits(120.0)
     assert check_apart(logs, Configuration(), bounds, purpose="heading") == check_many(
@@ -236,6 +238,7 @@ def test_a_watch_that_isolates_reads_no_log_in_its_own_process(tmp_path: Path, m
     assert given == [(["a.csv", "a.csv.gz"], [tmp_path / "note.txt"], True)]
 
 
+@pytest.mark.slow
 def test_a_watch_and_a_check_keep_the_limits(tmp_path: Path) -> None:
     """By the command, with the limits of settings: the size of a file for `watch` and `run`, time for `check`."""
     folder, settings = tmp_path / "in", tmp_path / "settings.toml"

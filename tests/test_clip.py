@@ -144,6 +144,7 @@ def test_a_part_of_a_part_is_told_in_times_of_the_flight(whole: Path, tmp_path: 
     assert metadata["clip.from"] == "2026-05-04T06:01:10.000Z"
 
 
+@pytest.mark.slow
 def test_two_parts_of_one_log_are_two_flights_of_a_run(whole: Path, tmp_path: Path) -> None:
     parts = [part_of(whole, tmp_path / "a.mcap", "0", "100"), part_of(whole, tmp_path / "b.mcap", "100", "200")]
     outcomes = run_many(parts, tmp_path / "out", Configuration(), jobs=1, with_pdf=False)

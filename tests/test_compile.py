@@ -381,6 +381,7 @@ def test_code_is_written_in_the_place_of_a_link_not_where_it_leads(tmp_path: Pat
     assert sorted(one.name for one in tmp_path.iterdir()) == ["kept", "victim"]
 
 
+@pytest.mark.slow
 @needs_root
 def test_what_numba_kept_of_a_class_that_an_update_moved_is_compiled_anew(tmp_path: Path) -> None:
     import numba
@@ -397,6 +398,7 @@ def test_what_numba_kept_of_a_class_that_an_update_moved_is_compiled_anew(tmp_pa
     assert index.read_bytes() != of_before, "kept again"
 
 
+@pytest.mark.slow
 def test_what_numba_pickled_is_not_loaded_from_the_folder_of_another_user(tmp_path: Path) -> None:
     program = "import numpy as np\nfrom tests.test_compile import mean\nprint(mean(np.ones(3)))"
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}

@@ -78,6 +78,7 @@ BY_TURNS = pytest.mark.parametrize(
 )
 
 
+@pytest.mark.slow
 @BY_TURNS
 def test_everything_else_runs_without_a_system(name: str, tmp_path: Path) -> None:
     gone = taken_out(tmp_path, name)

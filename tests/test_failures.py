@@ -477,6 +477,7 @@ def test_a_plan_with_failures_has_all_else(tmp_path: Path, monkeypatch: pytest.M
     }
 
 
+@pytest.mark.slow
 def test_a_session_with_failures_has_all_else_and_is_run_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from groundstation.pipeline.one_flight.configuration import load_configuration
     from groundstation.pipeline.verbs.cooperative import run_session

@@ -337,6 +337,7 @@ def logs_in(folder: Path, days: tuple[int, ...]) -> list[Path]:
     return found
 
 
+@pytest.mark.slow
 def test_logs_of_one_ins_learn_in_any_order_and_one_log_learns_from_the_file(tmp_path: Path) -> None:
     logs = logs_in(tmp_path / "logs", (1, 2, 3))
     once, twice = tmp_path / "once", tmp_path / "twice"

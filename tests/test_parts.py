@@ -311,6 +311,7 @@ def test_a_part_that_comes_later_makes_the_flight_again(tmp_path: Path, order: t
     assert_is_the_whole(out, with_headers, tmp_path)
 
 
+@pytest.mark.slow
 def test_a_part_that_changes_makes_the_flight_again(tmp_path: Path) -> None:
     folder, out = tmp_path / "logs", tmp_path / "out"
     *_others, last = written(folder, with_headers, (0, 40, 75, 100))
@@ -343,6 +344,7 @@ def test_names_out_of_order_and_a_part_twice(tmp_path: Path) -> None:
     assert [one.state for one in outcomes].count("skipped") == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("aircraft", [("A", "B"), ("", "")])
 def test_two_aircraft_in_one_folder_are_two_flights(tmp_path: Path, aircraft: tuple[str, str]) -> None:
     """Told apart by what the logs name, or else by where they are."""

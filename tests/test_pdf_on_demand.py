@@ -101,6 +101,7 @@ def test_the_pdf_of_a_finished_run_is_that_of_one_run(finished: Path, tmp_path: 
         assert path.read_bytes() == (at_once / path.relative_to(added)).read_bytes(), path
 
 
+@pytest.mark.slow
 def test_a_pdf_that_is_not_as_the_run_left_it_is_made_again_where_it_is_asked_for(
     finished: Path, tmp_path: Path
 ) -> None:
@@ -143,6 +144,7 @@ def test_a_page_that_is_made_again_keeps_its_pdf(finished: Path, tmp_path: Path)
     assert told == {"reporting"} and contents(out) == before
 
 
+@pytest.mark.slow
 def test_other_results_lose_the_pdfs_of_the_earlier_ones(finished: Path, tmp_path: Path) -> None:
     out = copied(finished, tmp_path / "out")
     run_many([SHORT], out, Configuration(), jobs=1, with_pdf=True)
@@ -196,6 +198,7 @@ def test_results_alone_with_pdfs_is_an_error_of_usage(verb: str, tmp_path: Path)
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_no_pdf_is_what_happens_by_itself(tmp_path: Path) -> None:
     for options in (("--no-pdf",), ("--pdf", "--no-pdf"), ("--only", "results", "--no-pdf")):
         out = tmp_path / "-".join(options)
@@ -232,6 +235,7 @@ def test_a_plan_of_another_scenario_is_made_again(tmp_path: Path) -> None:
     assert load_manifest(Path(again.folder)).configuration["scenario"]["duration_s"] == 5.0
 
 
+@pytest.mark.slow
 def test_a_watch_and_the_python_api_write_pdfs_where_they_are_asked_to(finished: Path, tmp_path: Path) -> None:
     logs = tmp_path / "logs"
     logs.mkdir()

@@ -207,6 +207,7 @@ run_many([SHORT], Path(sys.argv[1]), Configuration(), jobs=1)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moment", [1, *(pytest.param(at, marks=pytest.mark.slow) for at in (0, *range(2, 80, 3)))])
 def test_killed_while_it_waits_for_the_disk_the_next_run_gives_the_same(
     finished: Path, tmp_path: Path, moment: int

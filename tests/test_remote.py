@@ -83,6 +83,7 @@ def test_a_run_elsewhere_gives_what_a_run_here_gives(
     assert [name for name in RemoteFolder(out).names() if name == ".staging"] == []
 
 
+@pytest.mark.slow
 def test_what_is_finished_elsewhere_is_not_done_again(
     memory: str, finished_run: Callable[..., Outcome], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -103,6 +104,7 @@ def test_what_is_finished_elsewhere_is_not_done_again(
     assert_equal_runs(copy, Path(finished_run(SHORT.stem, SETTINGS).folder).parent)
 
 
+@pytest.mark.slow
 def test_a_flight_elsewhere_loses_its_pdf_and_keeps_what_somebody_put_there(
     memory: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -155,6 +157,7 @@ def test_what_groundstation_made_is_no_log(memory: str) -> None:
     assert far_logs(f"{far.url}/a.ulg") == [(f"{far.url}/a.ulg", True, 1)]
 
 
+@pytest.mark.slow
 def test_twins_elsewhere_are_run_once(memory: str) -> None:
     source, told = RemoteFolder(f"{memory}logs"), []
     content = SHORT.read_bytes()
@@ -306,6 +309,7 @@ def test_a_cluster_loses_nothing_when_a_worker_is_killed(bucket: str, logs: Path
     assert_equal_runs(copy, whole)
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_goes_away_is_told_in_one_line(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
     scheduler_file = tmp_path / "scheduler.json"

@@ -64,6 +64,7 @@ def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("field", "made", "read"), RENAMED, ids=[f"{field} of {read}" for field, _, read in RENAMED])
 def test_a_renamed_field_is_missed_by_who_reads_it(field: str, made: tuple[str, ...], read: str, copied: Path) -> None:
     files = [copied / "groundstation" / name for name in made]

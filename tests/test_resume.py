@@ -112,6 +112,7 @@ def test_a_changed_setting_keeps_the_mcap_and_gives_what_a_new_run_gives(
     assert plan_many([SHORT], out, SETTINGS)[0].text == "finished, nothing to do"
 
 
+@pytest.mark.slow
 def test_results_alone_are_those_of_a_whole_run_which_makes_the_rest_later(finished: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     command = ["run", str(SHORT), "-o", str(out), "--only", "results", "-q", "-j", "1"]
@@ -332,6 +333,7 @@ def test_a_log_that_takes_too_long_costs_itself_alone(tmp_path: Path) -> None:
     assert time.monotonic() - began < 60.0 and ended_children()
 
 
+@pytest.mark.slow
 def test_logs_that_wait_are_run_when_all_but_a_late_one_ended_at_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -352,6 +354,7 @@ def ended_children() -> bool:
     return not multiprocessing.active_children()
 
 
+@pytest.mark.slow
 def test_a_time_limit_leaves_no_part_of_a_flight(tmp_path: Path) -> None:
     limited = crew_for("", 1, 1, silent, 1.0)
     assert limited.func is side_by_side  # one log, too, is run in a process that can be ended

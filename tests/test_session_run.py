@@ -249,6 +249,7 @@ def test_any_number_of_processes_gives_equal_bytes(
             assert (tmp_path / name).read_bytes() == (out / name).read_bytes(), name
 
 
+@pytest.mark.slow
 def test_a_run_elsewhere_gives_the_session_too(
     out: Path, logs: Path, configuration: Configuration, tmp_path: Path
 ) -> None:
@@ -285,6 +286,7 @@ def test_a_run_elsewhere_gives_the_session_too(
     assert [row["flight_id"] for row in index if row["kind"] == "session"] == [IDENTITY]
 
 
+@pytest.mark.slow
 def test_the_session_grows_with_its_flights_and_one_of_the_verb_stays(
     logs: Path, configuration: Configuration, tmp_path: Path
 ) -> None:
@@ -314,6 +316,7 @@ def test_a_run_leaves_what_the_verb_made_of_the_same_logs(out: Path, logs: Path,
     assert codes >= {"session.assumed_sigmas", "session.no_stations", "session.unknown_source"}
 
 
+@pytest.mark.slow
 def test_stations_files_that_cannot_be_used(logs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "logs"
     shutil.copytree(logs, folder)
@@ -385,6 +388,7 @@ def test_bad_ranges_and_a_station_in_the_wrong_place(
     assert "to station N1: it is not where the ranges put it" in found["session.station_far"]
 
 
+@pytest.mark.slow
 def test_a_clock_a_week_off(copied: Path, configuration: Configuration, tmp_path: Path) -> None:
     log = copied / "example-C.csv"
     log.write_text(log.read_text().replace("2018-03-05T12:00:00.000Z", "2018-03-12T12:00:00.000Z"))

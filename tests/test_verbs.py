@@ -162,6 +162,7 @@ def test_fail_on_reaches_exit_4(tmp_path: Path) -> None:
     assert groundstation(*arguments, "--fail-on", "warn")[0] == 4
 
 
+@pytest.mark.slow
 def test_a_report_that_cannot_be_written_stops_no_other(tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert groundstation("run", str(SAMPLES / "taxi-short.csv"), "-o", str(out), "--no-pdf")[0] == 0

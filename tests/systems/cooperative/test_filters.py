@@ -409,7 +409,7 @@ def test_coming_and_going() -> None:
     assert not [one for one in findings if one.code != "cooperative.gated"]
     epochs = {row.vehicle: row.epochs for row in answer.vehicles if row.algorithm == "centralised"}
     assert epochs == {"A": 31, "B": 41, "C": 61}
-    check_nees(scenario, believed(scenario), "centralised", 7)
+    check_nees(scenario, believed(scenario), "centralised", 7, SEEDS[:12])
 
 
 def test_messages_are_so_many_bytes_and_come_back_as_they_were() -> None:

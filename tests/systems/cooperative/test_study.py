@@ -47,6 +47,7 @@ def test_verdicts() -> None:
     assert not diverges([outcome((1.0, 1.0), 2.9)]) and diverges([outcome((1.0, 1.0), 3.1)])
 
 
+@pytest.mark.slow
 def test_a_small_study_twice_is_the_same_and_says_what_it_did() -> None:
     cases = [case for case in CASES if case.name in ("one-four-satellites", "exact-alone")]
     one, two = (study_cooperative(1, 1, cases=cases, workers=1) for _ in range(2))

@@ -33,6 +33,7 @@ def stepped(count: int, seed: int = 4) -> tuple[Flight, float]:
     return replace(flight, tables=MappingProxyType(tables)), float(sizes_deg.sum())
 
 
+@pytest.mark.slow
 def test_many_steps_cost_as_little_as_some_and_the_error_is_that_after_the_last(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -25,6 +25,7 @@ def few(request: pytest.FixtureRequest) -> tuple[RunOutcome, ...]:
     return run_families([("continuous", FEW_SEED)], request.param)["continuous"]
 
 
+@pytest.mark.slow
 def test_error_squared_is_what_the_interval_says(few: tuple[RunOutcome, ...]) -> None:
     """Mean of (error / sigma)^2 inside the 99.9 % band of chi-square over so many degrees of freedom.
 

@@ -203,6 +203,7 @@ def test_one_ins_as_a_whole_and_from_the_middle(case: str, rate: float | None, t
     assert found is None if rate is None else found == pytest.approx(rate, abs=0.006)
 
 
+@pytest.mark.slow
 def test_a_real_ins_whose_log_begins_in_the_air_has_its_rate_by_a_stated_start(tmp_path: Path) -> None:
     log, settings = real_log("inertial/gv_ff02.csv"), tmp_path / "aircraft.toml"
     settings.write_text('[aircraft]\nnav_start_utc = "2014-06-01T20:01:12Z"\n')

@@ -694,6 +694,7 @@ def test_what_is_applied_is_part_of_what_is_remembered(first: Path, logs: tuple[
     assert not list(out.glob(".partial-*"))
 
 
+@pytest.mark.slow
 def test_a_run_elsewhere_has_the_files_and_loses_those_it_did_not_make(
     first: Path, logs: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
