@@ -154,6 +154,7 @@ def test_the_viewer_shows_the_flight_on_both_sides_of_the_date_line(
         stream.send_blueprint(rrb.Blueprint(rrb.Tabs(contents=[view]), auto_views=False))
         stream.disconnect()
     client = headless_viewer(tmp_path / "map.rrd")
+    settled(client)  # until the blueprint is there the view is another
     (shown,) = client.get_state().views
     pixels = picture(settled(client, shown.view_id))
     assert colourful(pixels) > 400
