@@ -14,16 +14,9 @@ from groundstation.base.attitude import rotation_n_from_b
 from groundstation.base.geodesy import has_position, north_east_m
 from groundstation.base.records import HEADING_IS_TRACK
 from groundstation.methods.intervals import effective_samples
-from groundstation.systems.trajectory.answer import (
-    LEAST_ERROR,
-    UNITS,
-    OffsetCause,
-    OnboardError,
-    OnboardErrors,
-    Quantity,
-)
 from groundstation.systems.trajectory.arrays import TrajectoryOnboard
 from groundstation.systems.trajectory.figures import offsets_m
+from groundstation.systems.trajectory.onboard_answer import OffsetCause, OnboardError, OnboardErrors
 from groundstation.systems.trajectory.onboard_offsets import (
     Constant,
     PlaceOffset,
@@ -35,6 +28,7 @@ from groundstation.systems.trajectory.onboard_offsets import (
     time_shift,
 )
 from groundstation.systems.trajectory.onboard_spans import wrong_spans
+from groundstation.systems.trajectory.quantity_answer import LEAST_ERROR, UNITS, Quantity
 from groundstation.systems.trajectory.sampling import at_times, every, thinned
 from groundstation.systems.trajectory.solution import FloatArray, TrackOfStates
 from groundstation.tables.table import Flight, Table
