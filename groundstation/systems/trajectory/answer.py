@@ -1,9 +1,7 @@
 """Answer of the best trajectory: state, accuracy, checks, errors of the on-board filter."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Any, ClassVar, Literal
 
 from groundstation.results.answer import Answer
@@ -12,61 +10,26 @@ from groundstation.results.arrays.typed import found_in
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
 from groundstation.results.roles import ErrorsOfFilter, FilterError, FilterWrong, StatesAlongTheFlight
+from groundstation.systems.trajectory.checks_answer import (
+    AgainstOwnTrack,
+    HeadingHypothesis,
+    HeldOutRow,
+    InnovationRow,
+    OutageRow,
+    OutageTruth,
+    RaisedSigma,
+    SeparationRow,
+)
+from groundstation.systems.trajectory.onboard_answer import OnboardErrors
+from groundstation.systems.trajectory.quantity_answer import Quantity
 
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
 
 TrajectoryState = Literal["accepted", "doubtful", "ambiguous"]
 MountingSource = Literal["stated", "logged", "found", "case"]
-OutageTruth = Literal["undisturbed solution", "RTK"]
 # Names of parameters that others read: of the lever arm, and of the receiver's delay.
 ARM = ("antenna forward of the unit", "antenna right of the unit", "antenna down of the unit")
 LATENCY, VELOCITY_LAG = "GNSS latency", "GNSS velocity behind its position"
-OffsetCause = Literal["", "mounting", "antenna", "datum", "sign"]
-Quantity = Literal[
-    "heading",
-    "roll",
-    "pitch",
-    "tilt",
-    "horizontal position",
-    "vertical position",
-    "horizontal velocity",
-    "vertical velocity",
-]
-UNITS: Mapping[Quantity, str] = MappingProxyType(
-    {
-        "heading": "deg",
-        "roll": "deg",
-        "pitch": "deg",
-        "tilt": "deg",
-        "horizontal position": "m",
-        "vertical position": "m",
-        "horizontal velocity": "m/s",
-        "vertical velocity": "m/s",
-    }
-)
-# Least error of the on-board filter that is one, however small our sigma; and that a report opens with.
-LEAST_ERROR: Mapping[Quantity, float] = MappingProxyType(
-    {
-        "heading": 0.3,
-        "roll": 0.2,
-        "pitch": 0.2,
-        "horizontal position": 1.0,
-        "vertical position": 2.0,
-        "horizontal velocity": 0.2,
-        "vertical velocity": 0.2,
-    }
-)
-OPENING_ERROR: Mapping[Quantity, float] = MappingProxyType(
-    {
-        "heading": 1.5,
-        "roll": 1.0,
-        "pitch": 1.0,
-        "horizontal position": 5.0,
-        "vertical position": 10.0,
-        "horizontal velocity": 1.0,
-        "vertical velocity": 1.0,
-    }
-)
 
 
 @dataclass(frozen=True)
@@ -126,15 +89,6 @@ class TrajectoryAccuracy:
 
 
 @dataclass(frozen=True)
-class RaisedSigma:
-    """Factor by which sigmas were raised, 1 where they held, and what asked for it."""
-
-    name: Literal["position", "velocity", "tilt", "heading"]
-    factor: float
-    reason: str = ""
-
-
-@dataclass(frozen=True)
 class NoiseRow:
     """One noise of the model: prior of its class, value fitted to the log.
 
@@ -162,180 +116,6 @@ class TrajectoryParameter:
     sigma: float
     start_sigma: float
     is_observable: bool
-
-
-@dataclass(frozen=True)
-class InnovationRow:
-    """Mean squared innovation of one sensor over what its covariance expects."""
-
-    sensor: str
-    ratio: float
-    count: int
-    low: float = 0.5
-    high: float = 2.0
-
-    @property
-    def is_inside(self) -> bool:
-        """Tell whether the ratio is within its limits."""
-        return self.low <= self.ratio <= self.high
-
-
-@dataclass(frozen=True)
-class HeldOutRow:
-    """GNSS that was held out of the solution against it.
-
-    ``error_rms`` is solution minus GNSS, ``sigma_rms`` what both sigmas expect of it.
-    """
-
-    quantity: Quantity
-    unit: str
-    count: int
-    error_rms: float
-    sigma_rms: float
-    inside95_share: float
-
-
-@dataclass(frozen=True)
-class AgainstOwnTrack:
-    """Heading minus own track on straights of what rolls.
-
-    ``mad_deg`` is the median absolute deviation, ``scatter_100_s_deg`` the scatter of medians over 100 s.
-    """
-
-    samples: int
-    mad_deg: float
-    scatter_100_s_deg: float | None = None
-
-
-@dataclass(frozen=True)
-class OutageRow:
-    """Replayed outages of one length.
-
-    Parameters
-    ----------
-    length_s : float
-    count : int
-    smoothed_rms_m : float
-        Largest horizontal error inside each outage, smoothed solution; RMS over the outages.
-    forward_end_rms_m : float or None
-        Horizontal error of the forward filter at the end of each outage, RMS.
-    inside95_share : float
-        Share of the outages whose largest error is inside 95 % of its sigma.
-    rms_over_sigma : float
-        RMS error over RMS sigma.
-    seconds : float
-        Replayed altogether.
-    """
-
-    length_s: float
-    count: int
-    smoothed_rms_m: float
-    forward_end_rms_m: float | None
-    inside95_share: float
-    rms_over_sigma: float
-    seconds: float
-
-
-@dataclass(frozen=True)
-class HeadingHypothesis:
-    """Heading at start and end under one hypothesis.
-
-    ``below_best`` is its log-likelihood below that of the best.
-    """
-
-    start_heading_deg: float
-    end_heading_deg: float
-    below_best: float
-
-
-@dataclass(frozen=True)
-class WrongSpan:
-    """Span in which the on-board filter was wrong beyond 95 %.
-
-    ``value`` is the median error in it, constant offset taken off; ``half95`` half of its 95 % interval, by the sigmas
-    of the smoothed solution and of the offset. ``largest`` is the largest error in it.
-    """
-
-    start_s: float
-    end_s: float
-    value: float
-    half95: float
-    largest: float
-
-    def over(self, quantity: Quantity) -> float:
-        """Return what is sure of the error, over the one that a report opens with."""
-        return (abs(self.value) - self.half95) / OPENING_ERROR[quantity]
-
-
-@dataclass(frozen=True)
-class OnboardError:
-    """Error of the on-board filter in one quantity: its output minus the smoothed solution.
-
-    Parameters
-    ----------
-    quantity : str
-    unit : str
-    samples : int
-    offset, offset_sigma : float or None
-        Constant over the log; None where none was looked for. It is never an error of the filter.
-    offset_cause : str
-        What a constant offset comes from; empty where it is not different from zero.
-    offset_words : str
-        "antenna or reference point 1.2 m forward, 0.3 m right".
-    rms : float
-        Of the rest; horizontal: of the vector.
-    sigma_rms : float
-        Of the smoothed solution at the same times.
-    correlation_s : float
-        Time for which its errors last.
-    spans : tuple of WrongSpan
-        The worst first.
-    """
-
-    quantity: Quantity
-    unit: str
-    samples: int
-    offset: float | None
-    offset_sigma: float | None
-    offset_cause: OffsetCause
-    offset_words: str
-    rms: float
-    sigma_rms: float
-    correlation_s: float
-    spans: tuple[WrongSpan, ...] = ()
-
-
-@dataclass(frozen=True)
-class OnboardErrors:
-    """Errors of the on-board filter of one topic, by quantity.
-
-    Parameters
-    ----------
-    topic : str
-    rows : tuple of OnboardError
-    delay_s, delay_sigma_s : float or None
-        How much later than the inertial unit its stamps are, taken off; None where the motion does not tell.
-    """
-
-    topic: str
-    rows: tuple[OnboardError, ...]
-    delay_s: float | None = None
-    delay_sigma_s: float | None = None
-
-    def row(self, quantity: Quantity) -> OnboardError | None:
-        """Return the row of a quantity, None where the filter does not log it."""
-        return next((one for one in self.rows if one.quantity == quantity), None)
-
-
-@dataclass(frozen=True)
-class SeparationRow:
-    """Difference of the forward filter from the smoothed solution in one quantity."""
-
-    quantity: Quantity
-    unit: str
-    rms: float
-    worst: float
-    worst_s: float
 
 
 @dataclass(frozen=True)

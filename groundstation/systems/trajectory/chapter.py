@@ -14,14 +14,8 @@ from groundstation.chapters.wording import (
     typeset,
 )
 from groundstation.results.flight import FlightResults
-from groundstation.systems.trajectory.answer import (
-    BestTrajectory,
-    HeldOutRow,
-    InnovationRow,
-    OnboardError,
-    TrajectoryParameter,
-    UnitMounting,
-)
+from groundstation.systems.trajectory.answer import BestTrajectory, TrajectoryParameter, UnitMounting
+from groundstation.systems.trajectory.checks_answer import HeldOutRow, InnovationRow
 from groundstation.systems.trajectory.claim_chapter import (
     claim_of,
     full_sentence,
@@ -29,6 +23,7 @@ from groundstation.systems.trajectory.claim_chapter import (
     unit_sign_of,
     wrong_texts,
 )
+from groundstation.systems.trajectory.onboard_answer import OnboardError
 from groundstation.systems.trajectory.wording_answer import (
     sentence_of,
     when,

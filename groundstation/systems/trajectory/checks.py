@@ -7,7 +7,7 @@ import numpy as np
 
 from groundstation.base.angles import wrap_180
 from groundstation.base.quantiles import NORMAL_95
-from groundstation.systems.trajectory.answer import AgainstOwnTrack, HeldOutRow, InnovationRow
+from groundstation.systems.trajectory.checks_answer import AgainstOwnTrack, HeldOutRow, InnovationRow
 from groundstation.systems.trajectory.estimate import Estimate
 from groundstation.systems.trajectory.outages import hidden, without
 from groundstation.systems.trajectory.slip import FASTER_MPS, STRAIGHT_DPS, turn_rate_dps

@@ -5,7 +5,8 @@ from collections.abc import Mapping
 from groundstation.base.words import with_half
 from groundstation.chapters.parts import Claim, Mark, Rank
 from groundstation.chapters.wording import number, number_with_unit, significant, typeset, with_full_stop
-from groundstation.systems.trajectory.answer import BestTrajectory, OutageRow, TrajectoryState
+from groundstation.systems.trajectory.answer import BestTrajectory, TrajectoryState
+from groundstation.systems.trajectory.checks_answer import OutageRow
 from groundstation.systems.trajectory.wording_answer import (
     accuracy_words,
     error_words,

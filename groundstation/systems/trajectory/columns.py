@@ -3,7 +3,8 @@
 from collections.abc import Callable
 
 from groundstation.results.columns import AnswerColumn
-from groundstation.systems.trajectory.answer import ARM, LATENCY, VELOCITY_LAG, BestTrajectory, Quantity
+from groundstation.systems.trajectory.answer import ARM, LATENCY, VELOCITY_LAG, BestTrajectory
+from groundstation.systems.trajectory.quantity_answer import Quantity
 
 OUTAGE_S = 60.0
 

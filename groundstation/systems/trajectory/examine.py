@@ -11,7 +11,7 @@ from groundstation.base.signals import topics_of_kind
 from groundstation.systems.analysis import Shortfall
 from groundstation.systems.known import Known
 from groundstation.systems.trajectory.gather import gather
-from groundstation.systems.trajectory.imu_input import SUBJECT
+from groundstation.systems.trajectory.imu_samples import SUBJECT
 from groundstation.systems.trajectory.settings import TrajectorySettings
 from groundstation.systems.trajectory.solve import mounting_of, require_enough
 from groundstation.tables.table import Flight

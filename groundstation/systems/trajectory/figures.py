@@ -9,14 +9,10 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.geodesy import curvature_radii_m
 from groundstation.base.quantiles import NORMAL_95, length_quantile
 from groundstation.results.arrays.states import BodyStates
-from groundstation.systems.trajectory.answer import (
-    UNITS,
-    Quantity,
-    SeparationRow,
-    TrajectoryAccuracy,
-    TrajectorySegment,
-)
+from groundstation.systems.trajectory.answer import TrajectoryAccuracy, TrajectorySegment
 from groundstation.systems.trajectory.arrays import TrajectorySeparation, TrajectoryTrack
+from groundstation.systems.trajectory.checks_answer import SeparationRow
+from groundstation.systems.trajectory.quantity_answer import UNITS, Quantity
 from groundstation.systems.trajectory.sampling import at_times, thinned
 from groundstation.systems.trajectory.solution import FloatArray, TrackOfStates
 

@@ -6,7 +6,8 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.systems.known import Known
 from groundstation.systems.trajectory.gathered import Gathered
 from groundstation.systems.trajectory.gnss_input import gnss_of
-from groundstation.systems.trajectory.imu_input import SUBJECT, imu_of
+from groundstation.systems.trajectory.imu_input import imu_of
+from groundstation.systems.trajectory.imu_samples import SUBJECT
 from groundstation.systems.trajectory.input_settings import InputSettings
 from groundstation.tables.table import Flight
 

@@ -24,5 +24,3 @@ class InputSettings:
     stuck_share_max: float = number(0.5, 0.0, 1.0)  # of the samples: with more of them stuck a unit is none
     covered_share_min: float = number(0.8, 0.0, 1.0)  # increments of less of the time are taken as samples
     covered_share_max: float = number(1.2, 1.0, 10.0)  # increments of more of the time overlap
-    accel_low_mps2: float = number(6.0, 0.0, 9.8)  # median specific force outside: not in m/s2, or no such sensor
-    accel_high_mps2: float = number(14.0, 9.8, 1000.0)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.quantiles import NORMAL_95
-from groundstation.systems.trajectory.answer import AgainstOwnTrack, OutageRow, RaisedSigma
+from groundstation.systems.trajectory.checks_answer import AgainstOwnTrack, OutageRow, RaisedSigma
 from groundstation.systems.trajectory.outages import LENGTHS_S, Outages
 from groundstation.systems.trajectory.solution import FloatArray, TrackOfStates
 

@@ -44,7 +44,7 @@ from groundstation.systems.trajectory.short_spans import (
     spans_of,
     steps_of,
 )
-from groundstation.systems.trajectory.unit_checks import stuck_axis, wrong_force
+from groundstation.systems.trajectory.unit_checks import wrong_force
 from groundstation.tables.vehicle import VehicleKind
 
 Source = Literal["stated", "logged", "found", "case", "refused"]
@@ -185,7 +185,7 @@ def find_mounting(
     if len(imu) < 3:
         return _refused("too few samples of the unit", MountingEvidence())
     steps = steps_of(imu, gnss, settings)
-    reason = wrong_velocity(gnss) or stuck_axis(imu) or wrong_force(steps, settings)
+    reason = wrong_velocity(gnss) or wrong_force(steps, settings)
     if reason:
         return _refused(reason, MountingEvidence())
     motion = _motion(imu, steps, settings)

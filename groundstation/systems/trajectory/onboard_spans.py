@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.base.quantiles import NORMAL_95, length_quantile
 from groundstation.base.records import BoolArray
-from groundstation.systems.trajectory.answer import WrongSpan
+from groundstation.systems.trajectory.onboard_answer import WrongSpan
 from groundstation.systems.trajectory.solution import FloatArray
 
 CORRELATION_S = 60.0  # errors of the smoothed solution last so long: a log has so many independent looks at it

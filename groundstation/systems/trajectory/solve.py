@@ -11,13 +11,8 @@ from groundstation.base.findings import Finding
 from groundstation.results.gates import Gate, judged_gate
 from groundstation.systems.known import Known
 from groundstation.systems.trajectory import checks, figures, judge, tell
-from groundstation.systems.trajectory.answer import (
-    BestTrajectory,
-    HeadingHypothesis,
-    InnovationRow,
-    TrajectoryState,
-    UnitMounting,
-)
+from groundstation.systems.trajectory.answer import BestTrajectory, TrajectoryState, UnitMounting
+from groundstation.systems.trajectory.checks_answer import HeadingHypothesis, InnovationRow
 from groundstation.systems.trajectory.estimate import Estimate
 from groundstation.systems.trajectory.gather import gather
 from groundstation.systems.trajectory.gathered import Gathered

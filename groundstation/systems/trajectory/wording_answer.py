@@ -1,12 +1,9 @@
 """Words for the best trajectory: state, accuracy, errors of the on-board filter."""
 
 from groundstation.base.words import places_of, span_text, with_half
-from groundstation.systems.trajectory.answer import (
-    BestTrajectory,
-    OnboardError,
-    Quantity,
-    WrongSpan,
-)
+from groundstation.systems.trajectory.answer import BestTrajectory
+from groundstation.systems.trajectory.onboard_answer import OnboardError, WrongSpan
+from groundstation.systems.trajectory.quantity_answer import Quantity
 
 SHORT: tuple[tuple[Quantity, str], ...] = (
     ("heading", "heading"),

@@ -9,23 +9,20 @@ from groundstation.base.angles import wrap_360
 from groundstation.results.answer import by_analysis
 from groundstation.results.flight import FlightResults
 from groundstation.results.gates import judged_gate
-from groundstation.systems.trajectory.answer import (
-    AgainstOwnTrack,
-    BestTrajectory,
-    HeadingHypothesis,
-    HeldOutRow,
-    InnovationRow,
-    NoiseRow,
-    OutageRow,
-    RaisedSigma,
-    TrajectoryParameter,
-    UnitMounting,
-)
+from groundstation.systems.trajectory.answer import BestTrajectory, NoiseRow, TrajectoryParameter, UnitMounting
 from groundstation.systems.trajectory.arrays import (
     TrajectoryBiases,
     TrajectoryOutages,
     TrajectoryResiduals,
     TrajectoryTrack,
+)
+from groundstation.systems.trajectory.checks_answer import (
+    AgainstOwnTrack,
+    HeadingHypothesis,
+    HeldOutRow,
+    InnovationRow,
+    OutageRow,
+    RaisedSigma,
 )
 from groundstation.systems.trajectory.figures import accuracy_of, segments_of, separation_of, states_of, track_figure
 from groundstation.systems.trajectory.onboard import compare_onboard

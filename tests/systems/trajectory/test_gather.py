@@ -368,6 +368,20 @@ def test_a_stuck_axis_is_left_out_or_refused() -> None:
     assert "gyro x of imu keeps one value" in refused(samples(time_s, rate_x_dps=np.full(len(time_s), 0.25)), fixes())
 
 
+@pytest.mark.parametrize("axis", range(6))
+def test_a_stuck_axis_of_increments_over_uneven_intervals_is_found(axis: int) -> None:
+    """A quiet unit whose intervals vary: the increments do too, and are in single precision."""
+    time_s = imu_times()
+    interval_s = (STEP_S * (1.0 + 0.01 * np.sin(7.0 * time_s))).astype(np.float32).astype(np.float64)
+    name = [*(f"delta_angle_{one}_rad" for one in "xyz"), *(f"delta_velocity_{one}_mps" for one in "xyz")][axis]
+    sound = increments(time_s, interval_s=interval_s)
+    values = sound.values(name).copy()
+    values[1000:4000] = (0.3 * interval_s[1000:4000]).astype(np.float32)
+    found = gathered(increments(time_s, interval_s=interval_s, **{name: values}), fixes())
+    assert codes(found)["stuck_axis"] == pytest.approx(3000, abs=2)
+    assert "stuck_axis" not in codes(gathered(sound, fixes()))
+
+
 def test_clipping_and_saturation_are_told_with_their_place() -> None:
     time_s = imu_times()
     clips = np.zeros(len(time_s))
@@ -377,17 +391,6 @@ def test_clipping_and_saturation_are_told_with_their_place() -> None:
     found = gathered(samples(time_s, gyro_clipping=clips, rate_z_dps=rate), fixes())
     assert (found.imu_facts.clipped, found.imu_facts.saturated) == (10, 20)
     assert "first at 0:15" in _text(found, "clipped") and "gyro z stays at 250 deg/s" in _text(found, "saturated")
-
-
-@pytest.mark.parametrize(
-    ("factor", "text"), [(1.0 / 9.80665, "is it in g?"), (0.0, "gravity is not in it"), (3.3, "9.8")]
-)
-def test_specific_force_of_another_unit_is_refused(factor: float, text: str) -> None:
-    time_s = imu_times()
-    wobble = noise(len(time_s))
-    scaled = {f"accel_{axis}_mps2": factor * wobble[:, 3 + at] + 1e-9 * wobble[:, at] for at, axis in enumerate("xy")}
-    down = factor * -GRAVITY + factor * wobble[:, 5] + 1e-9 * wobble[:, 2]
-    assert text in refused(samples(time_s, **scaled, accel_z_mps2=down), fixes())
 
 
 def test_no_unit_and_no_receiver_are_refused() -> None:

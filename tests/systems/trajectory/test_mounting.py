@@ -250,17 +250,6 @@ def test_what_is_likelier_unsound_is_a_doubt() -> None:
     assert not found((imu, gnss), "drive").doubt
 
 
-@pytest.mark.parametrize("sensor", ["gyro", "accelerometer"])
-@pytest.mark.parametrize("axis", range(3))
-def test_stuck_axis_is_refused(sensor: str, axis: int) -> None:
-    imu, gnss = simulated("drive")
-    name = "delta_angle_rad" if sensor == "gyro" else "delta_velocity_mps"
-    values = getattr(imu, name).copy()
-    values[len(values) // 2 :, axis] = 0.3 * imu.interval_s[len(values) // 2 :]
-    mounting = found((replace(imu, **{name: values}), gnss), "drive")
-    assert mounting.refused.startswith(f"{sensor} {'xyz'[axis]} is stuck: 0.3 for ")
-
-
 @pytest.mark.parametrize("family", EVERY)
 def test_unit_of_another_vehicle_is_refused(family: Family) -> None:
     imu, _ = simulated(family, seed=11)

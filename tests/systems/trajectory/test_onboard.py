@@ -6,8 +6,9 @@ import pytest
 from groundstation.base.angles import wrap_180
 from groundstation.base.attitude import rotation_n_from_b
 from groundstation.base.records import HEADING_IS_TRACK
-from groundstation.systems.trajectory.answer import OnboardError, OnboardErrors, Quantity
 from groundstation.systems.trajectory.onboard import ComparedFilter, compare_onboard
+from groundstation.systems.trajectory.onboard_answer import OnboardError, OnboardErrors
+from groundstation.systems.trajectory.quantity_answer import Quantity
 from groundstation.systems.trajectory.sampling import at_times
 from groundstation.tables.table import Flight
 from tests.systems.trajectory.made import onboard, track

@@ -17,8 +17,9 @@ from groundstation.results.flight import FlightResults, NotAssessable
 from groundstation.results.manifest import Manifest
 from groundstation.results.schema import summary_schema
 from groundstation.systems.system import Systems
-from groundstation.systems.trajectory.answer import BestTrajectory, OnboardErrors, WrongSpan
+from groundstation.systems.trajectory.answer import BestTrajectory
 from groundstation.systems.trajectory.chapter import trajectory
+from groundstation.systems.trajectory.onboard_answer import OnboardErrors, WrongSpan
 from groundstation.systems.trajectory.plots import PLOTS
 from groundstation.systems.trajectory.system import SYSTEM
 from groundstation.systems.trajectory.wording_answer import sentence_of

@@ -1,0 +1,89 @@
+"""Errors of the on-board filter, as the answer tells them."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from groundstation.systems.trajectory.quantity_answer import OPENING_ERROR, Quantity
+
+NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
+
+OffsetCause = Literal["", "mounting", "antenna", "datum", "sign"]
+
+
+@dataclass(frozen=True)
+class WrongSpan:
+    """Span in which the on-board filter was wrong beyond 95 %.
+
+    ``value`` is the median error in it, constant offset taken off; ``half95`` half of its 95 % interval, by the sigmas
+    of the smoothed solution and of the offset. ``largest`` is the largest error in it.
+    """
+
+    start_s: float
+    end_s: float
+    value: float
+    half95: float
+    largest: float
+
+    def over(self, quantity: Quantity) -> float:
+        """Return what is sure of the error, over the one that a report opens with."""
+        return (abs(self.value) - self.half95) / OPENING_ERROR[quantity]
+
+
+@dataclass(frozen=True)
+class OnboardError:
+    """Error of the on-board filter in one quantity: its output minus the smoothed solution.
+
+    Parameters
+    ----------
+    quantity : str
+    unit : str
+    samples : int
+    offset, offset_sigma : float or None
+        Constant over the log; None where none was looked for. It is never an error of the filter.
+    offset_cause : str
+        What a constant offset comes from; empty where it is not different from zero.
+    offset_words : str
+        "antenna or reference point 1.2 m forward, 0.3 m right".
+    rms : float
+        Of the rest; horizontal: of the vector.
+    sigma_rms : float
+        Of the smoothed solution at the same times.
+    correlation_s : float
+        Time for which its errors last.
+    spans : tuple of WrongSpan
+        The worst first.
+    """
+
+    quantity: Quantity
+    unit: str
+    samples: int
+    offset: float | None
+    offset_sigma: float | None
+    offset_cause: OffsetCause
+    offset_words: str
+    rms: float
+    sigma_rms: float
+    correlation_s: float
+    spans: tuple[WrongSpan, ...] = ()
+
+
+@dataclass(frozen=True)
+class OnboardErrors:
+    """Errors of the on-board filter of one topic, by quantity.
+
+    Parameters
+    ----------
+    topic : str
+    rows : tuple of OnboardError
+    delay_s, delay_sigma_s : float or None
+        How much later than the inertial unit its stamps are, taken off; None where the motion does not tell.
+    """
+
+    topic: str
+    rows: tuple[OnboardError, ...]
+    delay_s: float | None = None
+    delay_sigma_s: float | None = None
+
+    def row(self, quantity: Quantity) -> OnboardError | None:
+        """Return the row of a quantity, None where the filter does not log it."""
+        return next((one for one in self.rows if one.quantity == quantity), None)
