@@ -10,6 +10,7 @@ from groundstation.base.compile import in_place
 from groundstation.methods.kalman.arrays import Pattern
 from groundstation.systems.trajectory.states import (
     KEPT_ROWS,
+    LEV,
     NAVIGATION,
     STATES,
     WIDTH,
@@ -21,24 +22,26 @@ from groundstation.systems.trajectory.states import (
 
 
 @in_place
-def back_over_scalar(at: int, linear: Linear, solved: Solved, a: FloatArray, A: FloatArray, u: FloatArray) -> None:
+def back_over_scalar(
+    at: int, linear: Linear, solved: Solved, a: FloatArray, A: FloatArray, u: FloatArray, own: FloatArray
+) -> None:
     """Take the adjoint back over one scalar measurement.
 
-    a <- (I - K h)' a - h' y / S; A <- (I - K h)' A (I - K h) + h' h / S.
+    a <- (I - K h)' a - h' y / S; A <- (I - K h)' A (I - K h) + h' h / S. ``own`` (2,) is filled: the adjoint of the
+    noise of the measurement itself, squared, and its covariance.
     """
     K, weight = solved.K[at], 1.0 / solved.S[at]
-    total = 0.0
+    for i in range(STATES):
+        u[i] = 0.0
+    for j in range(STATES):  # u = A K
+        value = K[j]
+        if value != 0.0:
+            for i in range(STATES):
+                u[i] += value * A[j, i]
+    total, inner = solved.y[at] * weight, weight
     for j in range(STATES):
         total += K[j] * a[j]
-    inner = 0.0
-    for i in range(STATES):
-        s = 0.0
-        for j in range(STATES):
-            s += A[i, j] * K[j]
-        u[i] = s  # A K
-        inner += K[i] * s
-    total += solved.y[at] * weight
-    inner += weight
+        inner += K[j] * u[j]
     for e in range(WIDTH):
         value = linear.h[at, e]
         if value == 0.0:
@@ -47,56 +50,57 @@ def back_over_scalar(at: int, linear: Linear, solved: Solved, a: FloatArray, A: 
         a[r] -= value * total
         for j in range(STATES):
             A[r, j] -= value * u[j]
-            A[j, r] -= value * u[j]
-    for e in range(WIDTH):
-        value = linear.h[at, e]
-        if value == 0.0:
-            continue
-        r = linear.columns[at, e]
+        beside = value * inner - u[r]
         for f in range(WIDTH):
-            A[r, linear.columns[at, f]] += value * linear.h[at, f] * inner
+            A[r, linear.columns[at, f]] += beside * linear.h[at, f]
+    for e in range(WIDTH):
+        if linear.h[at, e] != 0.0:
+            r = linear.columns[at, e]
+            for j in range(STATES):
+                A[j, r] = A[r, j]
+    own[0], own[1] = total * total, inner
 
 
 @in_place
 def back_over_step(
     e: int, pattern: Pattern, linear: Linear, a: FloatArray, A: FloatArray, w: FloatArray, u: FloatArray
 ) -> None:
-    """Take the adjoint back over the transition that leads to epoch e: a <- F' a, A <- F' A F."""
-    rows, starts, columns = pattern
+    """Take the adjoint back over the transition that leads to epoch e: a <- F' a, A <- F' A F.
+
+    The rows of navigation are a block over the states before LEV, each other row of the pattern has a factor alone.
+    """
     F = linear.F[e]
-    for j in range(STATES):
-        u[j] = a[j]
-        for i in range(STATES):
-            w[i, j] = A[i, j]
-    # columns of A F, then rows of F' (A F); rows of F that are those of the identity stay
-    for t in range(len(rows)):
-        r = rows[t]
-        u[r] = 0.0
-        for i in range(STATES):
-            w[i, r] = 0.0
-    for t in range(len(rows)):
-        r = rows[t]
-        for q in range(starts[t], starts[t + 1]):
-            c, value = columns[q], F[q]
-            if value != 0.0:
-                u[c] += value * a[r]
-                for i in range(STATES):
-                    w[i, c] += value * A[i, r]
-    for i in range(STATES):
-        a[i] = u[i]
+    for c in range(LEV):  # w = F' A, the rows that change by navigation
+        keep = 1.0 if c >= NAVIGATION else 0.0
+        total = keep * a[c]
         for j in range(STATES):
-            A[i, j] = w[i, j]
-    for t in range(len(rows)):
-        r = rows[t]
-        for j in range(STATES):
-            A[r, j] = 0.0
-    for t in range(len(rows)):
-        r = rows[t]
-        for q in range(starts[t], starts[t + 1]):
-            c, value = columns[q], F[q]
+            w[c, j] = keep * A[c, j]
+        for r in range(NAVIGATION):
+            value = F[r * LEV + c]
             if value != 0.0:
+                total += value * a[r]
                 for j in range(STATES):
-                    A[c, j] += value * w[r, j]
+                    w[c, j] += value * A[r, j]
+        u[c] = total
+    for c in range(LEV):  # (F' A) F
+        a[c] = u[c]
+        for j in range(c, STATES):
+            A[c, j] = w[c, j] if j >= NAVIGATION else 0.0
+        for r in range(NAVIGATION):
+            value = w[c, r]
+            for j in range(c, LEV):
+                A[c, j] += value * F[r * LEV + j]
+    rows, starts, _columns = pattern
+    for t in range(NAVIGATION, len(rows)):
+        r, value = rows[t], F[starts[t]]
+        a[r] *= value
+        for i in range(r + 1):
+            A[i, r] *= value
+        for j in range(r, STATES):
+            A[r, j] *= value
+    for i in range(STATES):
+        for j in range(i):
+            A[i, j] = A[j, i]
 
 
 @in_place
@@ -112,6 +116,7 @@ def run_backward(
     A: FloatArray,
     w: FloatArray,
     u: FloatArray,
+    own: FloatArray,
     x: FloatArray,
     variance: FloatArray,
     plane: FloatArray,
@@ -126,7 +131,7 @@ def run_backward(
         Epochs between two variances of the biases, which walk slowly.
     a, A : ndarrays, shapes (n,), (n, n)
         Zero at the end of the data; changed in place.
-    w, u : ndarrays, shapes (n, n), (n,)
+    w, u, own : ndarrays, shapes (n, n), (n,), (2,)
         Room.
     x, variance : ndarrays, shapes (e, KEPT_ROWS), (e, KEPT_ROWS)
         Filled: smoothed correction to the estimate before the measurements of each epoch, and its variance.
@@ -139,7 +144,7 @@ def run_backward(
         for m in range(schedule.seen[e + 1] - 1, schedule.seen[e] - 1, -1):
             for i in range(2, -1, -1):
                 if solved.mark[3 * m + i] == 1:
-                    back_over_scalar(3 * m + i, linear, solved, a, A, u)
+                    back_over_scalar(3 * m + i, linear, solved, a, A, u, own)
         for i in range(KEPT_ROWS):
             total, spread, beside = 0.0, 0.0, 0.0
             for j in range(STATES):
@@ -149,11 +154,15 @@ def run_backward(
                 variance[e, i] = variance[e + 1, i]
                 continue
             for j in range(STATES):
-                s = 0.0
-                for r in range(STATES):
-                    s += A[j, r] * solved.p[e, i, r]
-                spread += solved.p[e, i, j] * s
-                beside += solved.p[e, 0, j] * s
+                u[j] = 0.0
+            for r in range(STATES):  # u = A p
+                value = solved.p[e, i, r]
+                if value != 0.0:
+                    for j in range(STATES):
+                        u[j] += value * A[r, j]
+            for j in range(STATES):
+                spread += solved.p[e, i, j] * u[j]
+                beside += solved.p[e, 0, j] * u[j]
             variance[e, i] = solved.p[e, i, i] - spread
             if i == 1:
                 plane[e] = solved.p[e, 0, 1] - beside

@@ -3,6 +3,7 @@
 It goes from start, latency, noise and slip to the smoothed passes.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from groundstation.base.angles import wrap_180, wrap_360
 from groundstation.base.errors import NotAssessableError
 from groundstation.systems.trajectory import observations, slip, still
-from groundstation.systems.trajectory.fit import NUMBERS, Fit, Number, fit_model
+from groundstation.systems.trajectory.fit import NUMBERS, Fit, Number, Scores, fit_model
 from groundstation.systems.trajectory.fix_motion import motion_of
 from groundstation.systems.trajectory.inputs import GnssFixes, ImuIncrements
 from groundstation.systems.trajectory.layout import Plan, Samples, fill_gaps, lay_out
@@ -22,13 +23,13 @@ from groundstation.systems.trajectory.passes import (
     Start,
     at_line,
     filter_epochs,
-    likelihood_of,
     line_of,
     linear_room,
     make_room,
     nothing_kept,
     run_pass,
 )
+from groundstation.systems.trajectory.score import Scored, Variances, score_of, solved_with
 from groundstation.systems.trajectory.start import starts_at
 from groundstation.systems.trajectory.states import (
     ATT,
@@ -52,7 +53,7 @@ OPEN_SIGMAS, CLOSED_SIGMAS = 30.0, 5.0  # of the gate, before and after the nois
 LATENCY_ROUNDS, LATENCY_ENOUGH_S = 6, 0.003
 MOST_LATENCY_S = 2.0  # no receiver is later; beyond it a filter has lost its way
 SETTLE_ROUNDS, LINE_ROUNDS = 3, 2
-FIT_S = 600.0  # seconds behind the first motion that the noise is fitted to
+COARSE_FIT_S, FIT_S = 150.0, 600.0  # seconds behind the first motion that the noise is fitted to
 MOVES_MPS = 1.0
 SETTLED_RAD = 5e-4  # attitude of the start against the pass before
 SLIP = (Number("slip_mps", 1.0, 0.1, 20.0), Number("slip_walk_deg_rts", 1.0, 0.1, 10.0))
@@ -81,11 +82,6 @@ class Problem:
     def plan(self, model: Model) -> Plan:
         """Return the epochs and the measurements with the variances of a model."""
         return lay_out(self.samples, model.weighted(self.seen), self.begin_s, self.latency_s, self.lag_s)
-
-    def reweighted(self, plan: Plan, model: Model) -> Plan:
-        """Return a plan of this problem with the variances of another model."""
-        variance = np.ascontiguousarray(model.weighted(self.seen).variance[plan.order])
-        return replace(plan, seen=plan.seen._replace(variance=variance))
 
     def noise(self, model: Model) -> Noise:
         """Return a model's numbers as the loops take them."""
@@ -261,20 +257,40 @@ def relinearised(problem: Problem, model: Model, rules: Gate, done: Pass, rounds
     return done
 
 
-def fitted(problem: Problem, model: Model, rules: Gate, done: Pass, numbers: tuple[Number, ...] = NUMBERS) -> Fit:
+def fitted(problem: Problem, model: Model, done: Pass, numbers: tuple[Number, ...] = NUMBERS) -> Fit:
     """Fit the numbers of the model to the first part of the log that moves.
 
-    The log is linearised about the line of a pass.
+    The log is linearised about the line of a pass. A search on the first minutes, with all that an open gate lets in,
+    says which measurements are outliers; the others are the same for all models of the second search.
     """
-    last_s = _first_motion_s(problem.gnss, problem.begin_s) + FIT_S
-    end = int(np.searchsorted(done.plan.epoch_s, last_s))
+    first_s = _first_motion_s(problem.gnss, problem.begin_s)
+    found = fit_model(model, _scores(problem, done, first_s + COARSE_FIT_S), numbers)
+    again = fit_model(model, _scores(problem, done, first_s + FIT_S, found.model), numbers, found.model)
+    return replace(again, evaluations=found.evaluations + again.evaluations)
 
-    def likelihood(at: Model) -> float:
-        plan = problem.reweighted(done.plan, at)
-        start = problem.restarted(done.begun, at)
-        return likelihood_of(problem.samples, plan, problem.noise(at), rules, start, done.linear, end)
 
-    return fit_model(model, likelihood, numbers)
+def _scores(problem: Problem, done: Pass, last_s: float, known: Model | None = None) -> Scores:
+    """Return the scores of models on the epochs up to a time.
+
+    Where a model is ``known``, what it rejects is left out.
+    """
+    plan, rules = done.plan, gate(OPEN_SIGMAS)
+    end = int(np.searchsorted(plan.epoch_s, last_s))
+    used = problem.seen.take(plan.order[: int(plan.schedule.seen[end])])
+
+    def variances(one: Model) -> Variances:
+        weighted = np.ascontiguousarray(one.weighted(used).variance)
+        return Variances(weighted, problem.noise(one), problem.restarted(done.begun, one))
+
+    if known is not None:
+        said = variances(known)
+        _, solved = solved_with(problem.samples, plan, gate(CLOSED_SIGMAS), done.linear, end, said)
+        used = replace(used, variance=np.where(solved.mark.reshape(-1, 3) < 0, np.nan, used.variance))
+
+    def scored(model_at: Callable[[FloatArray], Model], at: FloatArray) -> Scored:
+        return score_of(problem.samples, plan, rules, done.linear, end, lambda to: variances(model_at(to)), at)
+
+    return scored
 
 
 def estimate(
@@ -318,7 +334,7 @@ def estimate(
     found = Fit(model, done.likelihood, 0, ())
     if fit:
         done = relinearised(problem, model, rules, done)
-        found = fitted(problem, model, rules, done)
+        found = fitted(problem, model, done)
         model = found.model
     problem, start, done = settle(problem, model, rules, problem.restarted(start, model), SETTLE_ROUNDS)
     start, done = _at(problem, model, rules, start)
@@ -333,7 +349,7 @@ def estimate(
         start, done = _at(problem, model, rules, problem.restarted(start, model))
         if fit:
             done = relinearised(problem, model, rules, done)
-            found = fitted(problem, model, rules, done, SLIP)
+            found = fitted(problem, model, done, SLIP)
             model = found.model
             start, done = _at(problem, model, rules, problem.restarted(start, model))
     done = relinearised(problem, model, rules, done)

@@ -1,11 +1,12 @@
-"""Fit of the model's numbers to a log: penalised likelihood, one number after the other.
+"""Fit of the model's numbers to a log: penalised likelihood, climbed by its derivatives.
 
 The likelihood is that of the filter's innovations; each number has a prior about that of its class, wide in the
 logarithm, and bounds.
 
 Source: F. C. Schweppe, Evaluation of likelihood functions for Gaussian signals, IEEE
 Trans. Information Theory 11, 1965; R. K. Mehra, On the identification of variances and adaptive Kalman filtering, IEEE
-Trans. Automatic Control 15, 1970.
+Trans. Automatic Control 15, 1970; J. Nocedal, S. J. Wright, Numerical Optimization, 2nd edition, 2006, chapter 6
+(BFGS); H. Zhou, L. Hu, J. Zhou, K. Lange, MM algorithms for variance components models, 2019 (first steps).
 """
 
 from collections.abc import Callable
@@ -14,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.systems.trajectory.model import Model
+from groundstation.systems.trajectory.score import Scored
 from groundstation.systems.trajectory.states import FloatArray
 
 
@@ -44,8 +46,11 @@ NUMBERS = (
     Number("gyro_walk_dps_rth", 1.0, 0.02, 30.0),
     Number("accel_walk_mg_rth", 1.0, 0.02, 30.0),
 )
-FIRST_STEP, LEAST_STEP = 0.7, 0.12  # of the logarithm
-SWEEPS = 4
+LONGEST_STEP = 1.5  # of a logarithm
+FIRST_STEPS = 4  # by the degrees of freedom alone
+MOST_STEPS = 40
+SHORTER, SHORTEST = 0.3, 0.02  # a step that gains nothing is made shorter
+ENOUGH = 0.5  # log units that the next step may still gain
 
 
 @dataclass(frozen=True)
@@ -61,82 +66,83 @@ class Fit:
     at_bound: tuple[str, ...]
 
 
-def fit_model(prior: Model, likelihood: Callable[[Model], float], numbers: tuple[Number, ...] = NUMBERS) -> Fit:
+Scores = Callable[[Callable[[FloatArray], Model], FloatArray], Scored]
+
+
+def fit_model(
+    prior: Model, scored: Scores, numbers: tuple[Number, ...] = NUMBERS, begin: Model | None = None
+) -> Fit:
     """Return the model of largest penalised likelihood near ``prior``.
 
     Parameters
     ----------
     prior : Model
-    likelihood : callable
-        Logarithm of the likelihood of a log under a model.
+    scored : callable
+        Log-likelihood of a log and its derivatives; it takes the model as a function of the logarithms of the factors
+        on the numbers, and those logarithms, shape (n,).
+    begin : Model, optional
+        Where the search begins; the prior where there is none.
     """
-    logs = np.zeros(len(numbers))
+    spread = np.array([one.spread for one in numbers])
+    low, high = np.log([one.least for one in numbers]), np.log([one.most for one in numbers])
     count = 0
 
-    def model_of(at: FloatArray) -> Model:
+    def model_at(at: FloatArray) -> Model:
         return prior.changed({one.name: float(np.exp(step)) for one, step in zip(numbers, at, strict=True)})
 
-    def value_of(at: FloatArray) -> float:
+    def penalised(at: FloatArray) -> Scored:
         nonlocal count
         count += 1
-        penalty = sum(0.5 * (step / one.spread) ** 2 for one, step in zip(numbers, at, strict=True))
-        found = likelihood(model_of(at))
-        return float((found if np.isfinite(found) else -1e300) - penalty)
+        found = scored(model_at, at)
+        value = found.value if np.isfinite(found.value) else -1e300
+        return Scored(
+            float(value - 0.5 * np.sum((at / spread) ** 2)), found.gradient - at / spread**2, found.expected
+        )
 
-    best = value_of(logs)
-    steps = np.full(len(numbers), FIRST_STEP)
-    for _ in range(SWEEPS):
-        before = best
-        for i, one in enumerate(numbers):
-            low, high = np.log(one.least), np.log(one.most)
-            best, logs, moved = _along(value_of, logs, i, steps[i], low, high, best)
-            steps[i] = max(LEAST_STEP, steps[i] if moved else 0.4 * steps[i])
-        if best - before < 1.0 and steps.max() <= FIRST_STEP * 0.4:
+    logs = np.zeros(len(numbers))
+    if begin is not None:
+        logs = np.log([getattr(begin, one.name) / getattr(prior, one.name) for one in numbers])
+    best = penalised(logs)
+    inverse = _bound(best, spread)
+    for number in range(MOST_STEPS):
+        if begin is None and number < FIRST_STEPS:
+            inverse = _bound(best, spread)
+        step = _step(best, inverse, logs, low, high)
+        if float(best.gradient @ step) < 2.0 * ENOUGH:
             break
-    at_bound = tuple(
-        one.name
-        for one, step in zip(numbers, logs, strict=True)
-        if not np.log(one.least) + 1e-9 < step < np.log(one.most) - 1e-9
-    )
-    return Fit(model_of(logs), best, count, at_bound)
-
-
-def _along(
-    value_of: Callable[[FloatArray], float], logs: FloatArray, i: int, step: float, low: float, high: float, best: float
-) -> tuple[float, FloatArray, bool]:
-    """Walk along one number while it gets better.
-
-    The last step goes to the top of the parabola through the last three.
-    """
-
-    def at(number: float) -> FloatArray:
-        moved = logs.copy()
-        moved[i] = min(max(number, low), high)
-        return moved
-
-    seen = {float(logs[i]): best}
-
-    def look(number: float) -> float:
-        number = float(min(max(number, low), high))
-        if number not in seen:
-            seen[number] = value_of(at(number))
-        return seen[number]
-
-    centre = float(logs[i])
-    up, down = look(centre + step), look(centre - step)
-    for _ in range(6):
-        if up > seen[centre] and up >= down and centre < high:
-            centre = float(min(centre + step, high))
-            up = look(centre + step)
-            down = look(centre - step)
-        elif down > seen[centre] and centre > low:
-            centre = float(max(centre - step, low))
-            up = look(centre + step)
-            down = look(centre - step)
-        else:
+        share = 1.0
+        while share > SHORTEST:
+            tried = np.clip(logs + share * step, low, high)
+            found = penalised(tried)
+            if found.value > best.value:
+                break
+            share *= SHORTER
+        if found.value <= best.value:
             break
-    bend = up - 2.0 * seen[centre] + down
-    if bend < 0.0:
-        look(centre - 0.5 * step * (up - down) / bend)
-    top = max(seen, key=lambda number: seen[number])
-    return seen[top], at(top), top != float(logs[i])
+        inverse = _learned(inverse, tried - logs, best.gradient - found.gradient)
+        logs, best = tried, found
+    is_free = (logs > low + 1e-9) & (logs < high - 1e-9)
+    at_bound = tuple(one.name for one, free in zip(numbers, is_free, strict=True) if not free)
+    return Fit(model_at(logs), best.value, count, at_bound)
+
+
+def _bound(at: Scored, spread: FloatArray) -> FloatArray:
+    """Return a bound for the inverse of the information, shape (n, n): steps by it never go too far."""
+    return np.diag(1.0 / (2.0 * at.expected + spread**-2.0 + np.maximum(at.gradient, 0.0)))
+
+
+def _learned(inverse: FloatArray, step: FloatArray, fell: FloatArray) -> FloatArray:
+    """Return the inverse of the information, learned from what the derivatives fell by over a step (BFGS)."""
+    curved = float(step @ fell)
+    if curved <= 1e-6:
+        return inverse
+    left = np.eye(len(step)) - np.outer(step, fell) / curved
+    return np.asarray(left @ inverse @ left.T + np.outer(step, step) / curved)
+
+
+def _step(at: Scored, inverse: FloatArray, logs: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the next step of the numbers; one that stands at a bound and would pass it stays."""
+    free = ~(((logs <= low) & (at.gradient < 0.0)) | ((logs >= high) & (at.gradient > 0.0)))
+    step = np.zeros(len(logs))
+    step[free] = inverse[np.ix_(free, free)] @ at.gradient[free]
+    return np.asarray(step * min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-9)))

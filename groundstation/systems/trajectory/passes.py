@@ -226,6 +226,7 @@ def run_pass(
         square[0],
         square[1],
         np.zeros(STATES),
+        np.zeros(2),
         x,
         variance,
         plane,
@@ -252,18 +253,6 @@ def run_pass(
         start,
         moved(start, begun),
     )
-
-
-def likelihood_of(
-    samples: Samples, plan: Plan, noise: Noise, gate: Gate, start: Start, known: Linear, end: int | None = None
-) -> float:
-    """Return the log-likelihood of the epochs before ``end``.
-
-    The linearisation is known.
-    """
-    last = len(plan.epoch_s) if end is None else end
-    now, room = start.now(), make_room(start.prior)
-    return filter_epochs(samples, plan, noise, gate, OWN_ESTIMATE, (0, last), now, room, known, nothing_kept(), False)
 
 
 def moved(start: Start, correction: FloatArray) -> Start:

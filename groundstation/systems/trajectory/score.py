@@ -1,0 +1,175 @@
+"""Score of a model: derivatives of the log-likelihood of a log by the numbers of its model.
+
+The adjoint ``a`` and ``A`` of the smoother are that of the covariance too: what is added to it at any place changes the
+log-likelihood by the trace of (a a' - A) / 2 times it. One filter and one way back give every derivative.
+
+Source: S. J. Koopman, N. Shephard, Exact score for time series models in state space form, Biometrika 79, 1992.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from groundstation.base.compile import in_place
+from groundstation.methods.kalman.arrays import Pattern
+from groundstation.systems.trajectory.backward import back_over_scalar, back_over_step
+from groundstation.systems.trajectory.forward import BLOCK
+from groundstation.systems.trajectory.layout import Plan, Samples
+from groundstation.systems.trajectory.passes import (
+    OWN_ESTIMATE,
+    PATTERN,
+    Start,
+    filter_epochs,
+    make_room,
+    nothing_kept,
+)
+from groundstation.systems.trajectory.states import (
+    BA,
+    BARO,
+    BG,
+    MNT,
+    SLOW,
+    STATES,
+    FloatArray,
+    Gate,
+    Linear,
+    Noise,
+    Schedule,
+    Solved,
+)
+
+DENSITIES = 6
+VARIANCES = 7
+STEP = 1e-3  # of a logarithm, for derivatives of the variances of a model
+
+
+@in_place
+def run_score(
+    schedule: Schedule,
+    pattern: Pattern,
+    linear: Linear,
+    solved: Solved,
+    end: int,
+    a: FloatArray,
+    A: FloatArray,
+    w: FloatArray,
+    u: FloatArray,
+    own: FloatArray,
+    by_scalar: FloatArray,
+    by_noise: FloatArray,
+) -> None:
+    """Go back over the epochs before ``end`` and fill the adjoints of what adds to the covariance.
+
+    Parameters
+    ----------
+    a, A : ndarrays, shapes (n,), (n, n)
+        Zero at the end of the data; changed in place: the adjoint of the start.
+    w, u, own : ndarrays, shapes (n, n), (n,), (2,)
+        Room.
+    by_scalar : ndarray, shape (2, s)
+        Zeros; filled for the variances of the scalars used: squares of the adjoint, and its covariance.
+    by_noise : ndarray, shape (2, DENSITIES + VARIANCES)
+        Zeros; the same, summed over the epochs, for densities and stationary variances of ``Noise``.
+    """
+    for e in range(end - 1, -1, -1):
+        for m in range(schedule.seen[e + 1] - 1, schedule.seen[e] - 1, -1):
+            for i in range(2, -1, -1):
+                at = 3 * m + i
+                if solved.mark[at] == 1:
+                    back_over_scalar(at, linear, solved, a, A, u, own)
+                    by_scalar[0, at], by_scalar[1, at] = own[0], own[1]
+        time_s, squared = linear.spent[e, 0], linear.spent[e, 1]
+        for side in range(2):
+            into = by_noise[side]
+            for j in range(STATES):
+                u[j] = a[j] * a[j] if side == 0 else A[j, j]
+            for i in range(3):
+                moved = a[i] * a[3 + i] if side == 0 else A[i, 3 + i]
+                into[0] += u[6 + i] * time_s
+                into[1] += time_s * (u[3 + i] + time_s * (moved + time_s * u[i] / 3.0))
+                into[2] += u[BG + i] * time_s
+                into[3] += u[BA + i] * time_s
+                into[4] += u[6 + i] * squared
+            for i in range(2):
+                into[5] += u[MNT + i] * time_s
+            for i in range(VARIANCES):
+                decay = linear.F[e, BLOCK + i]
+                into[DENSITIES + i] += u[BARO if i == 6 else SLOW + i] * (1.0 - decay * decay)
+        back_over_step(e, pattern, linear, a, A, w, u)
+
+
+@dataclass(frozen=True)
+class Variances:
+    """All that a model says, as a filter takes it.
+
+    ``seen`` (m, 3) are the variances of the measurements.
+    """
+
+    seen: FloatArray
+    noise: Noise
+    start: Start
+
+
+@dataclass(frozen=True)
+class Scored:
+    """Log-likelihood and its derivatives by some logarithms, each shape (n,).
+
+    A derivative is what the data say less what the model expects of them; ``expected`` is the latter, and twice of it
+    is a bound for the information: for so many degrees of freedom the number stands.
+    """
+
+    value: float
+    gradient: FloatArray
+    expected: FloatArray
+
+
+def score_of(
+    samples: Samples,
+    plan: Plan,
+    gate: Gate,
+    known: Linear,
+    end: int,
+    variances: Callable[[FloatArray], Variances],
+    at: FloatArray,
+) -> Scored:
+    """Return the log-likelihood of the epochs before ``end`` and its derivatives.
+
+    Parameters
+    ----------
+    known : Linear
+        Linearisation of the log.
+    variances : callable
+        What the model says where its numbers have these logarithms, shape (n,).
+    at : ndarray, shape (n,)
+    """
+    of = variances(at)
+    value, solved = solved_with(samples, plan, gate, known, end, of)
+    a, A, own, w, u = (np.zeros(shape) for shape in (STATES, (STATES, STATES), 2, (STATES, STATES), STATES))
+    by_scalar, by_noise = np.zeros((2, of.seen.size)), np.zeros((2, DENSITIES + VARIANCES))
+    run_score(plan.schedule, PATTERN, known, solved, end, a, A, w, u, own, by_scalar, by_noise)
+    by_start = np.stack([a * a, np.diagonal(A)])
+    sides = np.empty((len(at), 2))
+    for i in range(len(at)):
+        step = np.zeros(len(at))
+        step[i] = STEP
+        up, down = variances(at + step), variances(at - step)
+        noise = np.concatenate([up.noise.density - down.noise.density, up.noise.variance - down.noise.variance])
+        seen = np.nan_to_num(up.seen - down.seen).ravel()
+        start = np.diagonal(up.start.p - down.start.p)
+        sides[i] = (by_noise @ noise + by_scalar @ seen + by_start @ start) / (4.0 * STEP)
+    return Scored(value, sides[:, 0] - sides[:, 1], sides[:, 1])
+
+
+def solved_with(
+    samples: Samples, plan: Plan, gate: Gate, known: Linear, end: int, of: Variances
+) -> tuple[float, Solved]:
+    """Return the log-likelihood of the epochs before ``end``, and the gains and innovations of the filter."""
+    count = of.seen.size
+    plan = replace(plan, seen=plan.seen._replace(variance=of.seen))
+    solved = nothing_kept()._replace(
+        K=np.empty((count, STATES)), y=np.empty(count), S=np.ones(count), mark=np.zeros(count, dtype=np.int8)
+    )
+    now, room = of.start.now(), make_room(of.start.prior)
+    value = filter_epochs(samples, plan, of.noise, gate, OWN_ESTIMATE, (0, end), now, room, known, solved, carries=False)
+    return value, solved
