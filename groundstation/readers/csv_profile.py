@@ -22,7 +22,8 @@ from groundstation.readers.drafts.reasons import with_reasons
 from groundstation.readers.layout import TableLayout
 from groundstation.readers.losses import Losses
 from groundstation.readers.misnamed import misnamed
-from groundstation.readers.profile import Profile, load, shipped
+from groundstation.readers.profile import Profile
+from groundstation.readers.profile_file import load, shipped
 from groundstation.readers.profile_fit import Fit, delimiter_of, delimiters_of, fit_at, fit_below, joined_gaps
 from groundstation.readers.profile_layout import layout_of
 from groundstation.readers.profile_sources import other_profiles
