@@ -8,6 +8,7 @@ cell stood that could not be read.
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
@@ -61,6 +62,16 @@ def without(text: Any, missing: Sequence[str]) -> Any:
     return pc.if_else(pc.is_in(text, value_set=arrow.texts(missing)), arrow.NO_TEXT, text)
 
 
+def cleaned(text: Any, missing: Sequence[str]) -> Any:
+    """Trim cells; those that are empty, or mean no value, become null."""
+    return without(trimmed(text), missing) if missing else trimmed(text)
+
+
+def with_point(text: Any) -> Any:
+    """Return cells with a point for a decimal comma."""
+    return pc.replace_substring(text, ",", ".", max_replacements=1)
+
+
 def part_of(text: Any, number: int) -> Any:
     """Return one of the words of each cell, counted from 1; null where there are fewer.
 
@@ -73,11 +84,11 @@ def part_of(text: Any, number: int) -> Any:
     return pc.struct_field(words, [0])
 
 
-def degrees(text: Any) -> TableCells:
+def degrees(text: Any, among_parts: bool = False) -> TableCells:
     """Convert degrees, minutes and seconds in one cell to degrees; plain degrees go through.
 
     The parts may be parted by blanks, colons or their signs; the seconds may be absent. A sign stands before, or a
-    letter N, S, E or W on either side.
+    letter N, S, E or W on either side. ``among_parts``: other cells of the column have minutes.
 
     Examples
     --------
@@ -85,7 +96,7 @@ def degrees(text: Any) -> TableCells:
     >>> read.column.values.tolist(), read.unreadable.tolist()
     ([-0.5, 47.21, -8.508333333333333, -12.505, -8.5, nan], [False, False, False, False, False, True])
     """
-    array, unreadable = _cast(text, pa.float64(), _NUMBER)
+    array, unreadable = _cast(text, pa.float64(), _NUMBER, is_sound=not among_parts)
     if not unreadable.any():
         return TableCells(_column(array, float("nan")), unreadable)
     parts = pc.extract_regex(text, _DMS)
@@ -151,16 +162,15 @@ def roots(read: TableCells) -> TableCells:
     return TableCells(Column(values, mask & ~is_below), read.unreadable | is_below)
 
 
-def _cast(text: Any, target: Any, pattern: str) -> tuple[Any, BoolArray]:
-    """Cast a column; where that fails, cast what matches ``pattern`` and mark the rest."""
+def _cast(text: Any, target: Any, pattern: str, is_sound: bool = True) -> tuple[Any, BoolArray]:
+    """Cast a column; where that fails, or it is not sound, cast what matches ``pattern`` and mark the rest."""
     options = pc.CastOptions(target_type=target, allow_decimal_truncate=True)
-    none = np.zeros(len(text), dtype=bool)
-    try:
-        return pc.cast(text, options=options), none
-    except pa.ArrowException:
-        fits = pc.fill_null(pc.match_substring_regex(text, pattern), arrow.FALSE)
-        kept = pc.if_else(fits, text, arrow.NO_TEXT)
-        return pc.cast(kept, options=options), arrow.is_valid(text) & ~arrow.mask(fits)
+    if is_sound:
+        with suppress(pa.ArrowException):
+            return pc.cast(text, options=options), np.zeros(len(text), dtype=bool)
+    fits = pc.fill_null(pc.match_substring_regex(text, pattern), arrow.FALSE)
+    kept = pc.if_else(fits, text, arrow.NO_TEXT)
+    return pc.cast(kept, options=options), arrow.is_valid(text) & ~arrow.mask(fits)
 
 
 def _column(array: Any, filler: float | int) -> Column:

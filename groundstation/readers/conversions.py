@@ -8,15 +8,15 @@ import numpy as np
 import pyarrow as pa
 
 from groundstation.base.records import Column
-from groundstation.readers import cells
+from groundstation.readers import cells, dms
 from groundstation.readers.cells import TableCells
-from groundstation.readers.layout import LayoutRule, number_of
+from groundstation.readers.layout import LayoutRule, TableLayout, number_of
 from groundstation.readers.rows import restore_delimiters
 
 _FILLERS: Mapping[str, float | str | bool] = {"double": float("nan"), "bool": False, "text": ""}
 
 
-def read_cells(rule: LayoutRule, array: Any, delimiter: str) -> tuple[TableCells, str]:
+def read_cells(rule: LayoutRule, array: Any, layout: TableLayout, delimiter: str) -> tuple[TableCells, str]:
     """Return the values of a column, and words for the cells that cannot be read.
 
     Factor and offset of the rule are not applied.
@@ -25,12 +25,25 @@ def read_cells(rule: LayoutRule, array: Any, delimiter: str) -> tuple[TableCells
     ----------
     rule : LayoutRule
     array : pyarrow array of string or float64
-        Trimmed cells, or the numbers that the CSV parser made of them.
+        Cells, or the numbers that the CSV parser made of them.
+    layout : TableLayout
+        Layout of the table that the column is of.
     delimiter : str
     """
     is_text = pa.types.is_string(array.type)
-    if is_text and rule.missing:
-        array = cells.without(array, rule.missing)
+    has_comma = layout.decimal_comma and rule.kind == "double"
+
+    def pointed(text: Any) -> Any:
+        return cells.with_point(text) if has_comma else text
+
+    def cleaned(text: Any) -> Any:
+        text = pointed(cells.cleaned(text, layout.missing))
+        return cells.without(text, rule.missing) if rule.missing else text
+
+    if rule.form == "dms" and not rule.part and dms.is_quick((*rule.missing, *layout.missing), len(array)):
+        read = dms.degrees(pointed(array), cleaned)
+        return _without_numbers(read, rule.missing), "cells that are not degrees, minutes and seconds"
+    array = cleaned(array) if is_text else array
     if is_text and rule.part:
         array = cells.part_of(array, rule.part)
     if rule.values:
@@ -44,8 +57,7 @@ def read_cells(rule: LayoutRule, array: Any, delimiter: str) -> tuple[TableCells
         read, what = cells.degrees(array), "cells that are not degrees, minutes and seconds"
     else:
         read = cells.numbers(array) if is_text else cells.ready_numbers(array)
-    if rule.missing:
-        read = _without_numbers(read, rule.missing)
+    read = _without_numbers(read, rule.missing)
     if rule.form == "variance":
         return cells.roots(read), "cells that are not a variance"
     return read, what
@@ -54,5 +66,7 @@ def read_cells(rule: LayoutRule, array: Any, delimiter: str) -> tuple[TableCells
 def _without_numbers(read: TableCells, missing: Sequence[str]) -> TableCells:
     """Return a column without the numbers that mean no value."""
     numbers = [number for text in missing if (number := number_of(text)) is not None]
+    if not numbers:
+        return read
     is_none = np.isin(read.column.values, numbers) & read.column.mask
     return replace(read, column=Column(read.column.values, read.column.mask & ~is_none)) if is_none.any() else read

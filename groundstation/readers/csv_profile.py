@@ -22,7 +22,8 @@ from groundstation.readers.drafts.reasons import with_reasons
 from groundstation.readers.layout import TableLayout
 from groundstation.readers.losses import Losses
 from groundstation.readers.misnamed import misnamed
-from groundstation.readers.profile import Profile, load, shipped
+from groundstation.readers.profile import Profile
+from groundstation.readers.profile_file import load, shipped
 from groundstation.readers.profile_fit import Fit, delimiter_of, delimiters_of, fit_at, fit_below, joined_gaps
 from groundstation.readers.profile_layout import layout_of
 from groundstation.readers.profile_sources import other_profiles
@@ -137,7 +138,7 @@ def claim_by(source: Source, profile: Path) -> Claim:
         When the file has no header row with the columns that the profile asks for.
     """
     loaded = load(profile)
-    _fitted(source, loaded)
+    source.seen[profile] = _fitted(source, loaded)
     return Claim(NAME, loaded.name, 1.0)
 
 
@@ -147,13 +148,16 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
     It is read by ``profile``, or by the shipped profile that fits.
     """
     if profile is not None:
-        fit = _fitted(source, load(profile))
+        fit = source.seen.pop(profile, None) or _fitted(source, load(profile))  # as just claimed
     else:
         found = _best(source)
         if found is None:
             raise UnreadableLogError(source.name, "no table of a known layout", "", "describe it by a profile")
         fit = found[1]
-    yield from _items(source, _joined(source, fit))
+    try:
+        yield from _items(source, _joined(source, fit))
+    finally:
+        source.seen.clear()
 
 
 def _items(whole: Source, fit: Fit) -> Iterator[Item]:
@@ -238,9 +242,17 @@ def _fit(profile: Profile, encoding: str, lines: Sequence[HeadLine]) -> Fit | No
 
 def _seen(source: Source, profile: Profile, cells: int = 0, joined: tuple[int, ...] = ()) -> Source:
     """Return the source with tabs for blanks, or between columns of fixed width."""
-    if profile.widths:
-        return FixedSource(source.path, source, profile.widths)
-    return SpacedSource(source.path, source, cells, joined) if profile.has_blanks else source
+    if not profile.is_spaced:
+        return source
+    key = profile.widths, cells, joined
+    if key not in source.seen:
+        source.seen[key] = (
+            FixedSource(source.path, source, profile.widths)
+            if profile.widths
+            else SpacedSource(source.path, source, cells, joined)
+        )
+    found: Source = source.seen[key]
+    return found
 
 
 def _joined(source: Source, fit: Fit) -> Fit:

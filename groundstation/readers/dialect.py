@@ -3,6 +3,8 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
+from typing import NamedTuple
 
 from groundstation.base.errors import UnreadableLogError
 from groundstation.readers.source import HEAD_BYTES, Source
@@ -14,8 +16,7 @@ _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
 _DECIMAL_POINT = re.compile(r"[+-]?\d+\.\d+")
 
 
-@dataclass(frozen=True)
-class HeadLine:
+class HeadLine(NamedTuple):
     """Line of the head: its number, where the next one starts, its text without line end.
 
     Numbers count from 1; ``next_byte`` is the byte where the next line starts.
@@ -84,19 +85,18 @@ def head_lines(source: Source, encoding: str, limit: int = 1000) -> list[HeadLin
     A last line that the head cuts off is left out.
     """
     head = source.head
-    position = len(_UTF8_BOM) if head.startswith(_UTF8_BOM) else 0
+    first = len(_UTF8_BOM) if head.startswith(_UTF8_BOM) else 0
     separator = b"\n" if b"\n" in head or b"\r" not in head else b"\r"
-    lines: list[HeadLine] = []
-    while position < len(head) and len(lines) < limit:
-        end = head.find(separator, position)
-        ended = end >= 0
-        if not ended and len(head) < source.size:
-            break
-        stop, following = (end, end + 1) if ended else (len(head), len(head))
-        text = head[position:stop].decode(encoding, errors="replace").rstrip("\r")
-        lines.append(HeadLine(len(lines) + 1, following, text, ended))
-        position = following
-    return lines
+    lines = head[first:].split(separator, limit)
+    rest = lines.pop()
+    ends = [first + end for end in accumulate(len(line) + 1 for line in lines)]
+    is_ended = [True] * len(lines)
+    if rest and len(lines) < limit and len(head) == source.size:
+        lines, ends, is_ended = [*lines, rest], [*ends, len(head)], [*is_ended, False]
+    texts = b"\n".join(lines).decode(encoding, errors="replace").split("\n")
+    if b"\r" in head:
+        texts = [text.rstrip("\r") for text in texts]
+    return list(map(HeadLine, range(1, len(lines) + 1), ends, texts, is_ended))
 
 
 def detect_delimiter(header: str) -> str:
@@ -130,6 +130,11 @@ def split_cells(line: str, delimiter: str) -> list[str]:
     return [cell.strip() for cell in line.split(delimiter)]
 
 
+def cell_count(line: str, delimiter: str) -> int:
+    """Return the number of cells of a line."""
+    return len(split_cells(line, delimiter)) if '"' in line else line.count(delimiter) + 1
+
+
 def normal_form(line: str, delimiter: str) -> str:
     """Return a line with its cells trimmed, so that padding makes no difference."""
     return delimiter.join(split_cells(line, delimiter))
@@ -149,6 +154,8 @@ def uses_decimal_comma(rows: Sequence[str], delimiter: str) -> bool:
     """
     if delimiter == ",":
         return False
+    if not any("," in row for row in rows):
+        return False
     cells = [cell for row in rows for cell in split_cells(row, delimiter)]
     if any(_DECIMAL_POINT.fullmatch(cell) for cell in cells):
         return False  # with decimal points a comma separates thousands, or stands in a text
@@ -167,7 +174,7 @@ def trailing_cells(rows: Sequence[str], delimiter: str, names: int) -> int:
     """
     votes = []
     for row in rows:
-        cells = len(split_cells(row, delimiter))
+        cells = cell_count(row, delimiter)
         if cells == names:
             votes.append(-1)
         elif cells == names + 1 and row.rstrip(" ").endswith(delimiter):

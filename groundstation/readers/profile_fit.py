@@ -7,7 +7,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from groundstation.base.source_units import PREFIX, units_entry
-from groundstation.readers.dialect import DELIMITERS, Dialect, HeadLine, normal_form, split_cells, trailing_cells
+from groundstation.readers.dialect import (
+    DELIMITERS,
+    Dialect,
+    HeadLine,
+    cell_count,
+    normal_form,
+    split_cells,
+    trailing_cells,
+)
 from groundstation.readers.profile import Profile
 from groundstation.readers.sections import HeaderPlace, lines_below
 from groundstation.readers.source import Source
@@ -233,11 +241,15 @@ def joined_gaps(profile: Profile, names: Sequence[str], rows: Sequence[str]) -> 
 
     Returns also the gaps between these cells, counted from 0; 0 and none where the rows have a cell for each name.
     """
+    if not profile.has_blanks:
+        return 0, ()
     of_angles = {rule.name for rule in profile.columns if rule.form == "dms"}
     places = [at for at, name in enumerate(names) if name in of_angles or bare(name) in of_angles]
-    counts = Counter(len(split_cells(row, "\t")) for row in rows if row.strip())
+    if not places:
+        return 0, ()
+    counts = Counter(cell_count(row, "\t") for row in rows if row.strip())
     cells = counts.most_common(1)[0][0] if counts else 0
-    if not profile.has_blanks or not places or cells != len(names) + 2 * len(places):
+    if cells != len(names) + 2 * len(places):
         return 0, ()
     return cells, tuple(gap for number, at in enumerate(places) for gap in (at + 2 * number, at + 2 * number + 1))
 
@@ -245,10 +257,11 @@ def joined_gaps(profile: Profile, names: Sequence[str], rows: Sequence[str]) -> 
 def fit_at(profile: Profile, encoding: str, delimiter: str, lines: Sequence[HeadLine], at: int) -> Fit:
     """Match a profile to the header row ``at`` of the lines at the top of a file."""
     fit = _with_names(profile, encoding, delimiter, lines, at)
+    is_row = [fit.is_row(line.text) for line in lines[:at]]
     return replace(
         fit,
-        above=tuple(line for line in lines[:at] if not fit.is_row(line.text)),
-        rows_above=tuple(line for line in lines[:at] if fit.is_row(line.text)),
+        above=tuple(line for line, is_one in zip(lines, is_row, strict=False) if not is_one),
+        rows_above=tuple(line for line, is_one in zip(lines, is_row, strict=False) if is_one),
     )
 
 

@@ -15,7 +15,8 @@ from typing import Any
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.plug_ins import load_plug_ins
-from groundstation.readers.profile import Profile, load
+from groundstation.readers.profile import Profile
+from groundstation.readers.profile_file import load
 
 ENTRY_POINT_GROUP = "groundstation.profiles"
 MOST_FILES = 1000  # of one folder

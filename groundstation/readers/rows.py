@@ -18,7 +18,7 @@ from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.readers.dialect import Dialect, normal_form
 from groundstation.readers.losses import Losses
-from groundstation.readers.source import Source
+from groundstation.readers.source import RowShape, Source
 
 BLOCK_BYTES = 4 << 20
 MAX_LINE_BYTES = 8 << 20
@@ -56,10 +56,12 @@ class RowScanner:
         self.skipped: dict[int, str] = {}  # header and comment lines inside the file, by their numbers
 
     def __iter__(self) -> Iterator[RowBlock]:
-        with self._source.open() as stream:
+        with self._source.lines.open() as stream:
             stream.seek(self._dialect.first_byte)
             for piece, is_cut in self._pieces(stream):
-                block = self._scan(self._clean(piece), is_cut)
+                text, shape = self._source.rows(piece)
+                clean = self._clean(text)
+                block = self._scan(clean, is_cut, shape if clean is text else None)
                 if len(block.line_numbers):
                     yield block
 
@@ -116,14 +118,13 @@ class RowScanner:
             piece = piece.replace(b"\r\n", b"\n").replace(b"\r", _STRANGE)
         return piece.replace(b"\0", _STRANGE) if b"\0" in piece else piece
 
-    def _scan(self, text: bytes, is_cut: bool) -> RowBlock:
+    def _scan(self, text: bytes, is_cut: bool, shape: RowShape | None) -> RowBlock:
         if b'"' in text:
-            text = without_quotes(text, self._dialect.delimiter)
+            text, shape = without_quotes(text, self._dialect.delimiter), None
         array = np.frombuffer(text, dtype=np.uint8)
-        ends = np.flatnonzero(array == _LF)
+        shape = shape or _shape_of(array, self._dialect.delimiter)
+        ends, cells = shape.ends, shape.cells
         starts = np.concatenate(([0], ends[:-1] + 1))
-        delimiters = np.flatnonzero(array == ord(self._dialect.delimiter))
-        cells = np.diff(np.searchsorted(delimiters, ends), prepend=0) + 1
         numbers = self._next_line + np.arange(len(ends), dtype=np.int64)
         self._next_line += len(ends)
         skipped = self._skipped_lines(text, array, starts, ends, cells, numbers)
@@ -166,6 +167,12 @@ class RowScanner:
         few = cells < expected
         self._losses.add("dropped_rows", f"rows with fewer cells than the header's {expected}", numbers[few])
         self._losses.add("dropped_rows", f"rows with more cells than the header's {expected}", numbers[~few])
+
+
+def _shape_of(text: NDArray[np.uint8], delimiter: str) -> RowShape:
+    ends = np.flatnonzero(text == _LF)
+    delimiters = np.flatnonzero(text == ord(delimiter))
+    return RowShape(ends, np.diff(np.searchsorted(delimiters, ends), prepend=0) + 1)
 
 
 def without_quotes(text: bytes, delimiter: str) -> bytes:

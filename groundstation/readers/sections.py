@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import BinaryIO
 
+import numpy as np
+
 from groundstation.base.records import Damage, Remark
 from groundstation.readers.dialect import Dialect, HeadLine
 from groundstation.readers.layout import TableLayout
@@ -20,6 +22,7 @@ _ABOVE_BYTES, _BELOW_BYTES = 1 << 16, 1 << 14  # how far from a header line its 
 _MARK_OF_UTF8 = "\ufeff"  # a file that was appended to another brings its own
 _SHORT = 2  # characters: such a name stands in many a row
 _WORD = re.compile(rb"[\n\r][ \"#]*[A-Za-z_]")
+_WORD_OF_LF = re.compile(rb"\n[ \"#]*[A-Za-z_]")  # the same where lines end with a line feed: found sooner
 
 
 @dataclass(frozen=True)
@@ -98,7 +101,9 @@ def lines_with(
                 base, rest = base + len(piece) - 1, piece[-1:]
                 continue
             at = 0
-            while end > 0 and (hit := mark.search(piece, at, end)) is not None:
+            in_piece = _WORD_OF_LF if mark is _WORD and not _has_lone_cr(piece) else mark
+            is_none = mark is _WORD and not _has_letters(piece)
+            while end > 0 and not is_none and (hit := in_piece.search(piece, at, end)) is not None:
                 start, at = piece.rfind(separator, 0, hit.end()) + 1, piece.find(separator, hit.end())
                 if counted < base:
                     number, counted = number + _count(again, counted, base, separator), base
@@ -106,6 +111,15 @@ def lines_with(
                 text = piece[start:at].decode(encoding, errors="replace").rstrip("\r").removeprefix(_MARK_OF_UTF8)
                 yield HeadLine(number, base + at + 1, text, True), counted
             base, rest = base + max(end, 0), piece[max(end, 0) :]
+
+
+def _has_lone_cr(piece: bytes) -> bool:
+    return b"\r" in piece and piece.count(b"\r") != piece.count(b"\r\n")
+
+
+def _has_letters(piece: bytes) -> bool:
+    """Tell whether there may be a letter: numbers and what parts them have smaller bytes."""
+    return bool(np.frombuffer(piece, np.uint8).max(initial=0) >= ord("A"))
 
 
 def _count(stream: BinaryIO, start: int, end: int, separator: bytes) -> int:

@@ -8,14 +8,22 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import BinaryIO, Protocol, runtime_checkable
+from typing import Any, BinaryIO, Protocol, runtime_checkable
 
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.reading import open_to_read
-from groundstation.base.records import Damage, Item
+from groundstation.base.records import Damage, Int64Array, Item
 from groundstation.readers.compressed import Expanded, FileWindow, compression_of, expand, head_of
 
 HEAD_BYTES = 1 << 20  # a header row of 10 000 columns takes about 300 kB
+
+
+@dataclass(frozen=True)
+class RowShape:
+    """Shape of rows: the byte of each line feed, and the number of cells before it."""
+
+    ends: Int64Array
+    cells: Int64Array
 
 
 @dataclass(frozen=True)
@@ -38,6 +46,11 @@ class Source:
     def size(self) -> int:
         """Size in bytes, of the decompressed log when the file is compressed."""
         return self._expanded.size if self.compression else self._file_size
+
+    @cached_property
+    def seen(self) -> dict[Any, Any]:
+        """Findings of readers about the first bytes, which they keep for their next look."""
+        return {}
 
     @property
     def compression(self) -> str:
@@ -71,6 +84,15 @@ class Source:
         if self.compression:
             return io.BufferedReader(FileWindow(self._expanded.file, self._expanded.size))
         return self._open_file()
+
+    @property
+    def lines(self) -> "Source":
+        """Source of the lines that :meth:`rows` turns into rows; its bytes stand at the same places."""
+        return self
+
+    def rows(self, lines: bytes) -> tuple[bytes, RowShape | None]:
+        """Return whole lines as rows with delimiters between the cells, and their shape where it is known."""
+        return lines, None
 
     def damages(self) -> tuple[Damage, ...]:
         """Damage of the compressed file itself, once it was opened."""

@@ -8,15 +8,16 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.compile import in_place
 from groundstation.base.records import BoolArray
 from groundstation.readers.compressed import FileWindow, unnamed_file
 from groundstation.readers.positioned import Positioned
-from groundstation.readers.source import HEAD_BYTES, MadeSource, Source
+from groundstation.readers.source import HEAD_BYTES, MadeSource, RowShape, Source
 
 if TYPE_CHECKING:
     from _typeshed import WriteableBuffer
@@ -25,6 +26,7 @@ _BLANK, _TAB, _LF, _CR = 32, 9, 10, 13
 _NUMERIC = np.frombuffer(b"0123456789+-.", np.uint8)
 _BEFORE_BYTES = 1 << 16  # looked at before a place for the beginning of its line
 _PIECE_BYTES = 1 << 20
+_COMPILED_BYTES = 1 << 18  # below it numpy takes a moment, and a compiler some seconds
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,22 @@ class SpacedSource(MadeSource):
         return tabbed(np.frombuffer(head + (b"\n" if is_whole else b""), np.uint8), self.cells, self.joined)[
             : len(head)
         ]
+
+    @property
+    def lines(self) -> Source:
+        """The source without tabs."""
+        return self.whole
+
+    def rows(self, lines: bytes) -> tuple[bytes, RowShape | None]:
+        """Return lines with a tab before each cell, and no other blanks where there are many lines."""
+        text = np.frombuffer(lines, np.uint8)
+        if len(lines) < _COMPILED_BYTES or b'"' in lines:  # a cell in quotes keeps its blanks
+            return tabbed(text, self.cells, self.joined), None
+        is_joined = np.zeros(max(self.joined, default=-1) + 1, np.bool_)
+        is_joined[list(self.joined)] = True
+        tight, shape = np.empty(len(text), np.uint8), np.empty((2, np.count_nonzero(text == _LF)), np.int64)
+        size = tighten(text, tight, shape, self.cells, is_joined)
+        return tight[:size].tobytes(), RowShape(shape[0], shape[1])
 
     def open(self) -> BinaryIO:
         """Open for reading bytes with tabs."""
@@ -141,6 +159,70 @@ def tabbed(text: NDArray[np.uint8], cells: int = 0, joined: Sequence[int] = ()) 
         inside = is_part & np.isin(number, joined)
         converted[begins[inside] - 1] = _BLANK
     return converted.tobytes()
+
+
+@in_place
+def tighten(text: Any, tight: Any, shape: Any, cells: int, is_joined: Any) -> int:
+    """Write lines with a tab between cells and no other blanks; return their length.
+
+    A line that begins with blanks keeps one, and a comment all: they are told by their first character.
+
+    Parameters
+    ----------
+    text, tight : ndarray of uint8, shape (n,)
+        Lines, the last one ended; receives them.
+    shape : ndarray of int64, shape (2, lines)
+        Receives the place of each line feed in ``tight``, and the number of cells before it.
+    cells : int
+        As that of :class:`SpacedSource`.
+    is_joined : ndarray of bool, shape (k,)
+        Gaps that part no cells in such rows.
+    """
+    at, size, most, end, line, count = 0, 0, len(is_joined), len(text), 0, 1
+    while at < end:
+        is_comment, gaps, gap = text[at] == 35, 0, 0
+        if most > 0:
+            ahead = at
+            while ahead < end and text[ahead] != 10 and text[ahead] != 13:
+                is_blank = text[ahead] == 32 or text[ahead] == 9
+                was_blank = ahead > at and (text[ahead - 1] == 32 or text[ahead - 1] == 9)
+                gaps += 1 if was_blank and not is_blank else 0
+                ahead += 1
+            gaps -= 1 if text[at] == 32 or text[at] == 9 else 0
+        first = at
+        while at < end:
+            one = text[at]
+            if one > 32:
+                tight[size] = one
+                size += 1
+                at += 1
+            elif one == 32 or one == 9:
+                start = at
+                while at < end and (text[at] == 32 or text[at] == 9):
+                    at += 1
+                is_last = at == end or text[at] == 10 or text[at] == 13
+                is_inside = start > first and not is_last
+                kept = at - start - (1 if is_inside else 0) if is_comment else 1 if start == first else 0
+                for _blank in range(kept):
+                    tight[size] = 32
+                    size += 1
+                if is_inside:
+                    is_part = gaps == cells - 1 or (at < end and (48 <= text[at] <= 57 or text[at] in (43, 45, 46)))
+                    is_blank = gap < most and is_joined[gap] and is_part
+                    tight[size] = 32 if is_blank else 9
+                    count += 0 if is_blank else 1
+                    size += 1
+                    gap += 1
+            else:
+                if one == 10:
+                    shape[0, line], shape[1, line] = size, count
+                    line, count = line + 1, 1
+                tight[size] = one
+                size += 1
+                at += 1
+                if one == 10 or one == 13:
+                    break
+    return size
 
 
 def _ends_line(characters: NDArray[np.uint8]) -> BoolArray:

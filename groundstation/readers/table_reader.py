@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.csv as pa_csv
 
 from groundstation.base.angles import wrap_360
@@ -130,8 +129,8 @@ class TableReader:
         for block in RowScanner(self._source, section.dialect, Losses()) if columns else ():
             parsed = self._parse(block, dict.fromkeys(sorted(columns - texts), pa.string()))
             for column, array in parsed.items():
-                text = self._cleaned(array)
-                if not cells.are_numbers(_with_point(text) if section.layout.decimal_comma else text):
+                text = cells.cleaned(array, section.layout.missing)
+                if not cells.are_numbers(cells.with_point(text) if section.layout.decimal_comma else text):
                     texts.add(column)
             if texts == columns:
                 break
@@ -166,22 +165,16 @@ class TableReader:
     def _arrays(self, block: RowBlock, with_time: bool = True) -> dict[int, Any]:
         """Return the cells of the columns that have rules, and of the time.
 
-        As numbers where they can be, else as text.
+        As numbers where they can be, else as text as it stands.
         """
         layout = self._layout
         types = {rule.column: pa.float64() for rule in layout.rules}
         types |= {rule.column: pa.string() for rule in layout.rules if not rule.is_parsed}
         types |= dict.fromkeys(layout.time.columns if with_time else (), pa.string())
         try:
-            arrays = self._parse(block, types, "," if layout.decimal_comma else ".")
+            return self._parse(block, types, "," if layout.decimal_comma else ".")
         except pa.ArrowInvalid:  # some cell is no number: take all as text and find out which
-            arrays = self._parse(block, dict.fromkeys(types, pa.string()))
-        return {at: self._cleaned(array) if pa.types.is_string(array.type) else array for at, array in arrays.items()}
-
-    def _cleaned(self, text: Any) -> Any:
-        """Trim cells; those that are empty, or mean no value in any column, become null."""
-        missing = self._layout.missing
-        return cells.without(cells.trimmed(text), missing) if missing else cells.trimmed(text)
+            return self._parse(block, dict.fromkeys(types, pa.string()))
 
     def _fields(self, arrays: Mapping[int, Any], lines: Int64Array) -> dict[Key, Column]:
         """Columns of the rules, and those that are derived from them."""
@@ -222,18 +215,16 @@ class TableReader:
 
     def _time(self, arrays: Mapping[int, Any], lines: Int64Array) -> Column:
         rule = self._layout.time
-        texts = [arrays[column] for column in rule.columns]
+        texts = [cells.cleaned(arrays[column], self._layout.missing) for column in rule.columns]
         if self._layout.decimal_comma:
-            texts = [_with_point(text) for text in texts]
+            texts = [cells.with_point(text) for text in texts]
         read, zoneless = times_of(rule, texts, self._days)
         self.zoneless += zoneless
         self._losses.add("unreadable_cells", "times that cannot be read", lines[read.unreadable], where=rule.names[0])
         return read.column
 
     def _column(self, rule: LayoutRule, array: Any, lines: Int64Array) -> Column:
-        if self._layout.decimal_comma and rule.kind == "double" and pa.types.is_string(array.type):
-            array = _with_point(array)
-        read, what = read_cells(rule, array, self._dialect.delimiter)
+        read, what = read_cells(rule, array, self._layout, self._dialect.delimiter)
         self._losses.add("unreadable_cells", what, lines[read.unreadable], where=rule.target, topic=rule.topic)
         if read.cut is not None:
             what = f"texts cut to {MAX_TEXT_CHARACTERS} characters"
@@ -287,10 +278,6 @@ class TableReader:
             yield Remark("decimal_comma", "numbers are written with a decimal comma")
         if scanner.ends_without_newline:
             yield Remark("no_final_newline", "the last row has no line end: its last cell may be cut short")
-
-
-def _with_point(text: Any) -> Any:
-    return pc.replace_substring(text, ",", ".", max_replacements=1)
 
 
 def _zero_of(header: LogHeader, section: TableSection) -> int | None:

@@ -140,7 +140,7 @@ def _settings(section: str) -> Callable[[Path], Any]:
 def _profile(path: Path) -> None:
     from groundstation.pipeline.one_flight.convert import convert_log
     from groundstation.pipeline.one_flight.log import open_log
-    from groundstation.readers.profile import load
+    from groundstation.readers.profile_file import load
 
     load(path)
     log = path.with_suffix(".csv")

@@ -11,9 +11,10 @@ from groundstation.base.records import Damage, RecordBatch, Remark
 from groundstation.base.signals import TOPICS
 from groundstation.base.source_units import source_units
 from groundstation.base.units import CONVERSIONS, NS_PER_S
-from groundstation.readers import profile as profiles
+from groundstation.readers import profile_file as profiles
 from groundstation.readers import registry
 from groundstation.readers.layout import METHODS
+from groundstation.readers.profile import TIME_UNITS
 from tests.readers.test_flat_csv import Read
 
 BASIC = 'name = "p"\n[time]\nkind = "seconds"\ncolumn = "t"\n'
@@ -434,7 +435,7 @@ def test_shipped_profiles_load_and_have_distinct_names() -> None:
 
 def test_the_manual_names_every_unit_method_and_key() -> None:
     manual = (Path(__file__).parents[2] / "docs" / "profiles.md").read_text(encoding="utf-8")
-    for word in (*(unit for unit in CONVERSIONS if unit), *METHODS, *profiles.TIME_UNITS):
+    for word in (*(unit for unit in CONVERSIONS if unit), *METHODS, *TIME_UNITS):
         assert f"`{word}`" in manual, word
     for method in METHODS.values():
         assert all(f"`{name}`" in manual for name in method.inputs)

@@ -15,7 +15,7 @@ from groundstation.cli.main import app
 from groundstation.pipeline.verbs.profiles import findings_of, new_profile, try_profile
 from groundstation.readers import csv_profile, profile_sources, registry
 from groundstation.readers.drafts.words import meaning_of
-from groundstation.readers.profile import load
+from groundstation.readers.profile_file import load
 from tests.readers.test_flat_csv import Read
 
 RADIUS_M, SPEED_MPS, LATITUDE_DEG = 100.0, 10.0, 50.0

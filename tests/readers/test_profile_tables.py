@@ -10,7 +10,7 @@ from groundstation.base.records import NewLog, RecordBatch
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.survey import survey
-from groundstation.readers import csv_profile, profile, registry, rows, spaced
+from groundstation.readers import csv_profile, profile_file, registry, rows, spaced
 from groundstation.readers.source import Source
 from groundstation.readers.spaced import SpacedSource
 from tests.readers.test_flat_csv import Read
@@ -315,14 +315,14 @@ HDOP = '[columns]\nv = { field = "gnss.hdop" }\n'
 def test_a_mistake_names_its_key(tmp_path: Path, text: str, key: str) -> None:
     _log, settings = files(tmp_path, text, "")
     with pytest.raises(SettingsError, match=rf"my\.toml, {key}"):
-        profile.load(settings)
+        profile_file.load(settings)
 
 
 def test_a_shipped_profile_is_known_by_its_name(tmp_path: Path) -> None:
-    assert profile.load(Path("garmin-g5")).name == "garmin-g5"
+    assert profile_file.load(Path("garmin-g5")).name == "garmin-g5"
     own = tmp_path / "garmin-g5"
     own.write_text(f"{BASIC}{HDOP}")
-    assert profile.load(own).name == "p"
+    assert profile_file.load(own).name == "p"
 
 
 def test_a_block_that_ends_inside_a_line_loses_no_row(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
-from groundstation.readers import profile as profiles
+from groundstation.readers import profile_file as profiles
 from groundstation.readers import registry
 from groundstation.readers.rtklib_tag import tag_of
 from tests.readers.test_flat_csv import Read

@@ -12,7 +12,8 @@ from groundstation.readers.drafts.checked import ProfileCheck as ProfileCheck
 from groundstation.readers.drafts.checked import check_profile
 from groundstation.readers.drafts.draft import Draft as Draft
 from groundstation.readers.drafts.draft import draft_of, facts_of
-from groundstation.readers.profile import SHIPPED, Profile, known_as
+from groundstation.readers.profile import Profile
+from groundstation.readers.profile_file import SHIPPED, known_as
 from groundstation.readers.source import Source
 from groundstation.results.files import write_text
 

@@ -20,7 +20,8 @@ from groundstation.readers.bags.definitions import plain_name
 from groundstation.readers.bags.messages import Connection
 from groundstation.readers.bags.values import Values, attitude, body, level
 from groundstation.readers.mapping import Columns
-from groundstation.readers.profile import TIME_UNITS, Checker, ColumnRule, read_table
+from groundstation.readers.profile import TIME_UNITS, ColumnRule
+from groundstation.readers.profile_values import Checker, read_table
 
 _EARTH, _BODY = ("enu", "ned"), ("flu", "frd")
 # Quantity of a vector -> its fields, their unit, the frames it may be in (the first is that of ROS).

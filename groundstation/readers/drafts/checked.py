@@ -14,7 +14,7 @@ from groundstation.readers.drafts.causes import cause_of_numbers, cause_of_times
 from groundstation.readers.drafts.nearest import nearest_names
 from groundstation.readers.drafts.sample import TableSample, sample_of
 from groundstation.readers.layout import METHODS, Key, TableLayout
-from groundstation.readers.profile import load
+from groundstation.readers.profile_file import load
 from groundstation.readers.profile_fit import Fit
 from groundstation.readers.source import Source
 
