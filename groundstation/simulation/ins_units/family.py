@@ -39,7 +39,7 @@ GNSS_MODES: tuple[GnssMode, ...] = get_args(GnssMode)
 UNIT_NUMBERS = (2, 3)
 ROUTES: tuple[RouteKind, ...] = ("straight", "manoeuvring", "out_and_back", "dogleg", "racetrack", "late_survey")
 SHORTEST_S, LONGEST_S = 1800.0, 18_000.0
-NAVIGATION_SHARE, COARSE_SHARE, OWN_SHARE, LATER_SHARE = 0.6, 0.3, 0.5, 0.5
+NAVIGATION_SHARE, COARSE_SHARE, OWN_SHARE, LATER_SHARE, STATED_SHARE = 0.6, 0.3, 0.5, 0.5, 2.0 / 3.0
 SHORTEST_OUTAGE_S, LONGEST_OUTAGE = 300.0, 0.8  # the longest as a share of the flight
 COARSE = UnitOutput(
     velocity_step_mps=0.0643, position_step_deg=180.0 / 2**20, heading_step_deg=180.0 / 2**15
@@ -95,6 +95,7 @@ def healthy_flight(seed: int, run: int) -> UnitsSettings:
         has_gnss=mode != "without",
         outages=(GnssOutage(begin_s, begin_s + length_s),) if mode == "outage" else (),
         output=COARSE if rng.random() < COARSE_SHARE else UnitOutput(),
+        states_start=bool(rng.random() < STATED_SHARE),
     )
 
 

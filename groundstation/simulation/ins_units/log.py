@@ -109,7 +109,9 @@ def _metadata(flight: UnitsFlight, scenario: UnitsScenario, start_ns: int) -> di
         (_from_s, first), *later = unit.serials
         text = ", ".join([first, *(f"{serial} from {from_s:g}" for from_s, serial in later)])
         found["ins_serial" if unit.topic == "ins" else f"ins_serial.{unit.topic}"] = text
-    return found | {"nav_start_utc": _iso(scenario.start_utc_ns), "datum": "WGS-84"}
+    if flight.settings.states_start:
+        found["nav_start_utc"] = _iso(scenario.start_utc_ns)
+    return found | {"datum": "WGS-84"}
 
 
 def _iso(time_ns: int) -> str:

@@ -216,6 +216,8 @@ class UnitsSettings:
     outages : tuple of GnssOutage
     gust_mps : float
         Sigma of the velocity over the ground about the route, in the air.
+    states_start : bool
+        The log says when navigation began: at its first second.
     faults : tuple
         In the order given; those of outputs follow those of errors.
     """
@@ -232,6 +234,7 @@ class UnitsSettings:
     gust_mps: float = number(0.3, 0.0, 10.0)
     output: UnitOutput = field(default_factory=UnitOutput)
     common: CommonErrors = field(default_factory=CommonErrors)
+    states_start: bool = True
     faults: tuple[AnyUnitFault, ...] = ()
 
     def __post_init__(self) -> None:
