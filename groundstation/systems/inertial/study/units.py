@@ -98,8 +98,8 @@ def _sections(
         section(
             "Coverage of the intervals",
             "inside95: share of true values inside the 95 % interval; the truth is the same figure with the true "
-            "motion in place of GNSS, of lags and steps what was simulated. mean, spread: of the error over half of the "
-            "interval, 0 and 0.51 where the interval is honest.",
+            "motion in place of GNSS, of lags and steps what was simulated. mean, spread: of the error over half of "
+            "the interval, 0 and 0.51 where the interval is honest.",
             table(coverage),
         ),
         section("Assumptions broken", "Healthy units; shares as above.", table(broken)),
