@@ -28,6 +28,7 @@ def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict
             *_scenarios(),
             *_approaches(),
             *_inertial_units(),
+            *_several_ins(),
             *_sessions(),
             *_plans(),
             *_studies(),
@@ -117,6 +118,15 @@ def _inertial_units() -> list[dict[str, Any]]:
     return [
         {"kind": "scenario", "name": name, "title": load_imu_scenario(name).title, "needs": "nothing"}
         for name in imu_scenario_names()
+    ]
+
+
+def _several_ins() -> list[dict[str, Any]]:
+    from groundstation.simulation.ins_units.scenario import load_units_scenario, units_scenario_names
+
+    return [
+        {"kind": "scenario", "name": name, "title": load_units_scenario(name).title, "needs": "nothing"}
+        for name in units_scenario_names()
     ]
 
 

@@ -54,12 +54,14 @@ def simulate_to(
         return _imu_to(scenario, folder, seed, form, force=force)
     if form not in {"csv", "ch10"}:
         raise UsageError(scenario, f"--format {form}", "csv or ch10, or a scenario of an inertial unit (imu-uav)")
-    if form != "csv" and (is_session(scenario) or is_approach(scenario)):
+    if form != "csv" and (is_session(scenario) or is_approach(scenario) or has_units(scenario)):
         raise UsageError(scenario, f"--format {form}", "a scenario of one flight")
     if is_session(scenario):
         return _session_to(scenario, folder, seed, force=force)
     if is_approach(scenario):
         return [_approach_to(scenario, folder, seed, force=force)]
+    if has_units(scenario):
+        return [_units_to(scenario, folder, seed, force=force)]
     loaded = load_scenario(scenario)
     target = folder / f"{loaded.name}.{form}"
     if target.exists() and not force:
@@ -117,6 +119,20 @@ def is_imu(scenario: str) -> bool:
     return path.is_file() and "family" in read_toml(path)
 
 
+def has_units(scenario: str) -> bool:
+    """Tell whether a scenario is a flight with several INS units.
+
+    A shipped name of such, or a TOML file with ``[flown]`` that has ``units``.
+    """
+    from groundstation.simulation.ins_units.scenario import units_scenario_names
+
+    if not scenario.endswith(".toml"):
+        return scenario.lower() in units_scenario_names()
+    path = Path(scenario)
+    flown = read_toml(path).get("flown") if path.is_file() else None
+    return isinstance(flown, dict) and "units" in flown
+
+
 def _imu_to(name: str, folder: Path, seed: int | None, form: Form, *, force: bool) -> list[Path]:
     from groundstation.simulation.imu.dataflash import write_dataflash
     from groundstation.simulation.imu.ros_bag import write_ros1
@@ -149,6 +165,17 @@ def _approach_to(name: str, folder: Path, seed: int | None, *, force: bool) -> P
     if target.exists() and not force:
         raise UsageError(str(target), "a file that exists", "a new folder", "-f overwrites it")
     return write_approach(scenario, folder, seed)
+
+
+def _units_to(name: str, folder: Path, seed: int | None, *, force: bool) -> Path:
+    from groundstation.simulation.ins_units.log import write_units
+    from groundstation.simulation.ins_units.scenario import load_units_scenario
+
+    scenario = load_units_scenario(name)
+    target = folder / scenario.log_name
+    if target.exists() and not force:
+        raise UsageError(str(target), "a file that exists", "a new folder", "-f overwrites it")
+    return write_units(scenario, folder, seed)
 
 
 def _session_to(name: str, folder: Path, seed: int | None, *, force: bool) -> list[Path]:

@@ -93,6 +93,18 @@ def _study_forecast() -> "Callable[..., StudyResult]":
     return study_forecast
 
 
+def _study_units() -> "Callable[..., StudyResult]":
+    from groundstation.systems.inertial.study.units import study_units
+
+    return study_units
+
+
+def _outcome_units() -> type:
+    from groundstation.systems.inertial.study.units_runs import UnitsOutcome
+
+    return UnitsOutcome
+
+
 SYSTEM = System(
     name="inertial",
     analyses=(INERTIAL, FORECAST),
@@ -101,6 +113,12 @@ SYSTEM = System(
             "forecast",
             "forecast of INS errors: every method under true and false models, and how honest its sigma is",
             _study_forecast,
+        ),
+        Study(
+            "units",
+            "several INS of one flight: false alarms, faults found and named, coverage of the table's intervals",
+            _study_units,
+            _outcome_units,
         ),
     ),
     chapters=_chapters,

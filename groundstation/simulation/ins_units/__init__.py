@@ -1,0 +1,1 @@
+"""Flights with several INS units, one of which may be faulty."""
