@@ -1,0 +1,183 @@
+"""Answer on several INS of one flight: each against GNSS, in pairs, and which one is off."""
+
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
+
+from groundstation.results.answer import Answer
+from groundstation.results.figures import FigureData
+
+UnitState = Literal["good", "off", "one_of", "aided", "copy", "not_judged"]
+FaultKind = Literal["drift", "tilt", "step", "swapped_axis", "stuck", "frozen"]
+Verdict = Literal["agree", "off", "one_of", "not_judged"]
+UNIT_STATES: tuple[str, ...] = ("good", "off", "one_of", "aided", "copy", "not_judged")
+FAULT_KINDS: tuple[str, ...] = ("drift", "tilt", "step", "swapped_axis", "stuck", "frozen")
+VERDICTS: tuple[str, ...] = ("agree", "off", "one_of", "not_judged")
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Value with half of its 95 % interval.
+
+    The interval is that of the measurement: what the noise of the reference may do to the value.
+    """
+
+    schema_name: ClassVar[str] = "measured"
+
+    value: float
+    half95: float
+
+
+@dataclass(frozen=True)
+class InsFault:
+    """Fault of a unit, or of one of two.
+
+    Parameters
+    ----------
+    kind : str
+    topics : tuple of str
+        The unit; two where it may be either.
+    start_s, end_s : float or None
+        Flight seconds of a fault that has a place.
+    value, half95, unit
+        Size, with half of its 95 % interval where it has one: nmi/h of a drift, m/s of a tilt (Schuler amplitude), m or
+        m/s of a step; None where the kind has no size.
+    limit : float or None
+        Exceeded by an honest unit of the class in :attr:`UnitsResult.false_alarm_share` of flights.
+    by : str
+        Words for what shows it: "against gnss", "by three units", "by its own velocity".
+    text : str
+        The fault in words, without its topic.
+    """
+
+    schema_name: ClassVar[str] = "ins_fault"
+
+    kind: FaultKind = field(metadata={"one_of": FAULT_KINDS})
+    topics: tuple[str, ...]
+    by: str
+    text: str
+    start_s: float | None = None
+    end_s: float | None = None
+    value: float | None = None
+    half95: float | None = None
+    unit: str = ""
+    limit: float | None = None
+
+
+@dataclass(frozen=True)
+class InsUnit:
+    """One INS of a flight, with its errors against the reference.
+
+    Parameters
+    ----------
+    topic : str
+    serials : tuple of str
+        In order of time; more than one where the serial changes in flight, none where it is not stated.
+    kind, kind_reason : str
+        As of :class:`groundstation.systems.inertial.answer.InertialResult`.
+    has_position : bool
+    is_start_known : bool
+        Whether the start of navigation is proven; else the rate is the growth of the error inside the log.
+    compared_hours : float or None
+        Hours from the start of navigation, or of the log, to the last comparison with the reference.
+    rate_fit_nmiph : Measured or None
+        Slope through the origin of the radial error.
+    rate_50_nmiph, rate_95_nmiph : float or None
+        Error over time, median and 95 %, later than ten minutes; None where the start is not known.
+    velocity_rms_mps, schuler_mps : Measured or None
+        Velocity error RMS, and the amplitude of its part with the Schuler period.
+    largest_m : Measured or None
+    largest_at_s : float or None
+    heading_difference_deg : float or None
+        Median of the heading less that of the trajectory.
+    lag_s : Measured or None
+        Time by which its clock is behind that of the first unit; taken off before the comparison.
+    same_as : str
+        Topic of the unit whose numbers it repeats.
+    state : str
+        ``off``: named as faulty; ``one_of``: it or another; ``aided``: GNSS corrects it, so it is no witness;
+        ``copy``: it repeats another.
+    """
+
+    schema_name: ClassVar[str] = "ins_unit"
+
+    topic: str
+    kind: str
+    kind_reason: str
+    has_position: bool
+    state: UnitState = field(metadata={"one_of": UNIT_STATES})
+    serials: tuple[str, ...] = ()
+    is_start_known: bool = False
+    compared_hours: float | None = None
+    rate_fit_nmiph: Measured | None = None
+    rate_50_nmiph: float | None = None
+    rate_95_nmiph: float | None = None
+    velocity_rms_mps: Measured | None = None
+    schuler_mps: Measured | None = None
+    largest_m: Measured | None = None
+    largest_at_s: float | None = None
+    heading_difference_deg: float | None = None
+    lag_s: Measured | None = None
+    same_as: str = ""
+
+
+@dataclass(frozen=True)
+class InsPair:
+    """Second unit less the first one.
+
+    ``rate_limit_nmiph`` and ``velocity_limit_mps`` are what two honest units of the class exceed in
+    :attr:`UnitsResult.false_alarm_share` of flights; None where the pair is not judged, ``why_not`` says why.
+    """
+
+    schema_name: ClassVar[str] = "ins_pair"
+
+    first: str
+    second: str
+    hours: float
+    rate_fit_nmiph: float | None
+    velocity_rms_mps: float | None
+    schuler_mps: float | None
+    largest_m: float | None
+    heading_difference_deg: float | None
+    rate_limit_nmiph: float | None = None
+    velocity_limit_mps: float | None = None
+    is_beyond: bool = False
+    why_not: str = ""
+
+
+@dataclass(frozen=True)
+class UnitsResult(Answer):
+    """Several INS of one flight.
+
+    Parameters
+    ----------
+    verdict : str
+        ``agree``: no unit is off; ``off``: the ones in ``off`` are; ``one_of``: one of those in ``off`` is, the log
+        does not tell which; ``not_judged``: nothing that could tell.
+    against : str
+        Topic of the reference, empty where there is none.
+    against_title : str
+        The same in words.
+    false_alarm_share : float
+        Share of the flights of honest units in which a single limit is exceeded.
+    """
+
+    analysis: ClassVar[str] = "units"
+    schema_name: ClassVar[str] = analysis
+
+    verdict: Verdict = field(metadata={"one_of": VERDICTS})
+    sentence: str
+    off: tuple[str, ...]
+    units: tuple[InsUnit, ...]
+    pairs: tuple[InsPair, ...]
+    faults: tuple[InsFault, ...]
+    against: str
+    against_title: str
+    ins_class: str
+    ins_class_origin: str
+    false_alarm_share: float
+    settings: dict[str, Any] = field(default_factory=dict)
+    figures: tuple[FigureData, ...] = ()
+
+    def unit(self, topic: str) -> InsUnit:
+        """Return the unit of a topic."""
+        return next(one for one in self.units if one.topic == topic)
