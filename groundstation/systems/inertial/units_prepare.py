@@ -32,7 +32,7 @@ from groundstation.systems.inertial.units_grid import OnGrid, apart_m, grid_of, 
 from groundstation.systems.inertial.units_track import ReferenceTrack, UnitTrack
 from groundstation.tables.sources import AIDED
 
-BY_POSITION, BY_VELOCITY = "by its own position", "by its own velocity"
+BY_POSITION, BY_VELOCITY = "against its own position", "against its own velocity"
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class Prepared:
 
     @property
     def topic(self) -> str:
-        """Its topic."""
+        """Topic of the unit."""
         return self.track.topic
 
     @property
@@ -120,7 +120,7 @@ class Comparable:
 
 
 def prepare(tracks: Sequence[UnitTrack], reference: ReferenceTrack | None) -> Comparable:
-    """Bring units and reference to one grid and one clock, and take out what each shows by itself."""
+    """Bring units and reference to one grid and one clock, and take out own faults."""
     grid_s = grid_of(tracks)
     against = None if reference is None else on_grid(reference, grid_s)
     units = [Prepared(track, grid, grid) for track in tracks for grid in (on_grid(track, grid_s),)]
@@ -146,7 +146,7 @@ def _without_copies(units: list[Prepared]) -> list[Prepared]:
 
 
 def _upright(units: list[Prepared], against: OnGrid | None) -> list[Prepared]:
-    """Put exchanged axes right: by the unit's own position, by the reference, else by the others."""
+    """Put exchanged axes right: by own position, by the reference, or by the others."""
     witnesses = [one for one in units if not one.same_as]
     found: dict[str, Swapped] = {}
     for one in witnesses:
@@ -155,7 +155,7 @@ def _upright(units: list[Prepared], against: OnGrid | None) -> list[Prepared]:
         if by_itself is not None:
             found[one.topic] = Swapped(by_itself, BY_POSITION, (one.topic,))
         elif by_reference is not None:
-            found[one.topic] = Swapped(by_reference, "by the reference", (one.topic,))
+            found[one.topic] = Swapped(by_reference, "against the reference", (one.topic,))
     left = [one for one in witnesses if one.topic not in found]
     if against is None and len(left) > 1:
         found |= _by_the_others(left)
@@ -170,7 +170,7 @@ def _by_the_others(units: list[Prepared]) -> dict[str, Swapped]:
         seen = [matrix for matrix in told if matrix is not None]
         if len(seen) == len(others):
             topics = (one.topic,) if len(others) > 1 else tuple(unit.topic for unit in units)
-            return {one.topic: Swapped(seen[0], "by the others", topics)}
+            return {one.topic: Swapped(seen[0], "against the others", topics)}
     return {}
 
 
@@ -180,7 +180,9 @@ def _turned(one: Prepared, swapped: Swapped) -> Prepared:
 
 
 def _on_one_clock(units: list[Prepared], against: OnGrid | None, grid_s: FloatArray) -> list[Prepared]:
-    """Take off by how much stamps are late; the clock in the middle of three or more is the right one.
+    """Take off by how much stamps are late.
+
+    The clock in the middle of three or more is the right one.
 
     Of two it is the one that is nearer to the reference.
     """
@@ -233,7 +235,7 @@ def _unstuck(one: Prepared, units: list[Prepared], against: OnGrid | None) -> Pr
 
 
 def _steps_of(units: list[Prepared], against: OnGrid | None) -> tuple[Stepped, ...]:
-    """Find the steps of the witnesses: of position by their own velocity, of velocity by the other tracks."""
+    """Find steps of position by a unit's own velocity, of velocity by the other tracks."""
     own = [one for one in units if one.is_witness]
     found = [
         Stepped(jump, BY_VELOCITY, (one.topic,))
@@ -259,17 +261,20 @@ def _whose(seen: list[tuple[Jump, str, str]], tracks: dict[str, OnGrid]) -> list
         at_s = left[0][0].time_s
         group = [one for one in left if one[0].time_s - at_s <= SAME_TIME_S]
         left = left[len(group) :]
-        common = set.intersection(*({first, second} for _, first, second in group)) - {""}
+        common = set.intersection(*({first, second} for _, first, second in group))
+        if common == {""}:  # all units against the reference: it jumps, not they
+            continue
+        common -= {""}
         jump, first, second = max(group, key=lambda one: one[0].size.value)
         told = sorted(common) or sorted({first, second} - {""})
-        by = "by the others" if len(group) > 1 else "by the reference" if "" in (first, second) else ""
+        by = "against the others" if len(group) > 1 else "against the reference" if "" in (first, second) else ""
         if len(told) > 1:
             spikes = sorted(told, key=lambda topic: own_spike(tracks[topic], jump.time_s))
             if own_spike(tracks[spikes[-1]], jump.time_s) > CLEARER * own_spike(tracks[spikes[0]], jump.time_s):
                 told, by = [spikes[-1]], BY_VELOCITY
         sign = -1.0 if told[0] == second else 1.0
         vector = sign * jump.vector[0], sign * jump.vector[1]
-        found.append(Stepped(replace(jump, vector=vector), by or "by two units", tuple(told)))
+        found.append(Stepped(replace(jump, vector=vector), by or "in the difference of two units", tuple(told)))
     return found
 
 

@@ -1,4 +1,4 @@
-"""Faults of units: those each shows by itself, by the reference, by parity of three, by difference of two."""
+"""Faults of units: own ones, by the reference, by parity, by difference of two."""
 
 from collections.abc import Mapping, Sequence
 
@@ -47,7 +47,7 @@ def _held_faults(one: Prepared) -> list[InsFault]:
             "all outputs stand still" if held.is_frozen else f"velocity {listed([AXES[a] for a in held.axes])} sticks"
         )
         text = f"{what} from {clock_text(held.start_s)} for {held.end_s - held.start_s:.0f} s"
-        faults.append(InsFault(kind, (one.topic,), "by the other tracks", text, held.start_s, held.end_s))
+        faults.append(InsFault(kind, (one.topic,), "while the others move", text, held.start_s, held.end_s))
     return faults
 
 
@@ -84,13 +84,17 @@ def growth_faults(
     topics = [one.topic for one in found.witnesses if one.topic not in named]
     who = _by_parity(topics, pairs) if len(topics) > 2 else tuple(left[0].topics)
     worst = max((one for one in left if set(one.topics) & set(who)), key=lambda one: one.over)
-    by = f"by {'three' if len(topics) == 3 else len(topics)} units" if len(topics) > 2 else "by two units"
+    by = (
+        f"by parity of {'three' if len(topics) == 3 else len(topics)} units"
+        if len(topics) > 2
+        else "in the difference of two units"
+    )
     faults.append(_growth_fault(worst, who, by))
     return faults
 
 
 def _are_acquitted(pair: Judged, by_reference: Mapping[str, Judged]) -> bool:
-    """Tell whether the reference saw both of a pair for nearly all of the time, within their limits."""
+    """Tell whether the reference saw both of a pair nearly all the time, within limits."""
     if pair.growth is None:
         return False
     both = [by_reference.get(topic) for topic in pair.topics]
@@ -152,19 +156,14 @@ def sentence_of(
         own = [fault for fault in faults if fault.topics == topics]
         shown = sorted(own, key=lambda fault: fault.kind not in ("drift", "tilt"))
         more = f"; {len(shown) - 3} more" if len(shown) > 3 else ""
-        told = "; ".join(f"{fault.text}{_others(fault, by_reference)} {fault.by}" for fault in shown[:3])
-        one_of = {2: "one of the two"}.get(len(topics), "one or more")
-        who = (
-            f"{topics[0]} is off"
-            if len(topics) == 1
-            else f"{one_of} of {listed(topics)} is off".replace(" of the two of", " of")
-        )
+        told = "; ".join(f"{fault.text}{_others(fault, by_reference)}, {fault.by}" for fault in shown[:3])
+        who = f"{topics[0]} is off" if len(topics) == 1 else f"one of {listed(topics)} is off"
         sentences.append(f"{who}: {told}{more}")
     return "; ".join(sentences)
 
 
 def _others(fault: InsFault, by_reference: Mapping[str, Judged]) -> str:
-    """Return the same figure of the other units, for a rate or velocity of one against the reference."""
+    """Return the same figure of the other units against the reference."""
     if len(fault.topics) != 1 or fault.kind not in ("drift", "tilt") or fault.topics[0] not in by_reference:
         return ""
     others = [one for topic, one in by_reference.items() if topic != fault.topics[0]]
