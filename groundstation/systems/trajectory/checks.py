@@ -19,6 +19,7 @@ from groundstation.systems.trajectory.states import (
     NO_SLIP,
     POSITION,
     VELOCITY,
+    WHEEL,
 )
 
 SENSORS = {
@@ -27,6 +28,7 @@ SENSORS = {
     NO_SLIP: "no sideways or upward motion",
     HEIGHT: "barometric height",
     HEADING: "magnetic heading",
+    WHEEL: "wheel speed",
 }
 HELD_S, HELD_EVERY_S = 10.0, 100.0
 BLOCK_S = 100.0
@@ -41,7 +43,11 @@ def innovations_of(estimate: Estimate) -> tuple[InnovationRow, ...]:
     for kind, name in SENSORS.items():
         used = (solved.mark == 1) & (kinds == kind)
         if used.any():
-            ratio = float(np.mean(solved.y[used] ** 2 / solved.S[used]))
+            expected = solved.S[used]
+            if kind == HEADING:  # an observation is as sure as stated, but for all of them together
+                stated = np.repeat(estimate.result.plan.seen.variance[:, :1], 3, axis=0)[used, 0]
+                expected = expected - stated + estimate.problem.heading_sigma_rad**2
+            ratio = float(np.mean(solved.y[used] ** 2 / expected))
             rows.append(InnovationRow(name, ratio, int(used.sum())))
     return tuple(rows)
 

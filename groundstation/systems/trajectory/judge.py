@@ -123,6 +123,8 @@ def outage_rows(outages: Outages, factor: float) -> tuple[OutageRow, ...]:
                 float(np.mean(outages.ratio[of] <= factor)),
                 error / sigma,
                 float(length_s * of.sum()),
+                float(np.sqrt(np.mean(outages.down_m[of] ** 2))),
+                float(np.mean(outages.down_ratio[of] <= factor)),
             )
         )
     return tuple(rows)
