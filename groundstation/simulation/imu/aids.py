@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.atmosphere import SEA_LEVEL_K, SEA_LEVEL_PA
 from groundstation.base.declination import declination_along
 from groundstation.base.records import frozen
 from groundstation.simulation.imu.motion import Motion, TrueStates, true_states
@@ -12,6 +13,7 @@ from groundstation.simulation.imu.settings import BarometerSettings, CompassSett
 from groundstation.simulation.processes import gauss_markov
 
 FloatArray = NDArray[np.float64]
+LAPSE_K_PER_M, EXPONENT = 0.0065, 9.80665 / (287.05287 * 0.0065)
 ROUNDS = 20  # of the compass heading whose deviation leads to the magnetic one
 
 
@@ -70,6 +72,17 @@ def _barometer(
     )
     height = states.height_m[0] + (states.height_m - states.height_m[0]) * settings.scale
     return {"baro_s": time_s, "pressure_altitude_m": height + settings.offset_m + error}
+
+
+def pressure_pa(altitude_m: FloatArray) -> FloatArray:
+    """Return the pressure of the standard atmosphere below 11 km.
+
+    Examples
+    --------
+    >>> pressure_pa(np.array([0.0, 1000.0])).round(0).tolist()
+    [101325.0, 89875.0]
+    """
+    return np.asarray(SEA_LEVEL_PA * (1.0 - LAPSE_K_PER_M * altitude_m / SEA_LEVEL_K) ** EXPONENT)
 
 
 def _wheels(

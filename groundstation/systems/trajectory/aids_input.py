@@ -10,7 +10,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import topics_of_kind
 from groundstation.systems.known import Known
 from groundstation.systems.trajectory.aid_settings import AidSettings
-from groundstation.systems.trajectory.aids_answer import AidName, AidRow
+from groundstation.systems.trajectory.aids_answer import AidRow
 from groundstation.systems.trajectory.fix_motion import motion_of
 from groundstation.systems.trajectory.inputs import AidReadings, CompassReadings, GnssFixes
 from groundstation.systems.trajectory.pressure_checks import Beside, beside_gnss, stuck
@@ -167,10 +167,15 @@ def _compass(
     flight: Flight, known: Known, gnss: GnssFixes, settings: AidSettings, rows: list[AidRow], *, is_mounted: bool
 ) -> CompassReadings | None:
     """Return the readings of the compass whose deviation the aircraft file states."""
-    stated = known.aircraft.compass_deviation_deg
-    if stated is None or not settings.use_magnetic_heading:
+    if not settings.use_magnetic_heading:
         return None
     topic, table, is_field = _compass_table(flight, settings)
+    stated = known.aircraft.compass_deviation_deg
+    if stated is None:
+        if table is not None:
+            text = "the aircraft file states no deviation (compass_deviation_deg)"
+            rows.append(AidRow("magnetic heading", topic, False, text))
+        return None
     why = ""
     if table is None:
         why = "neither a magnetometer of three axes nor a magnetic heading in the log"
@@ -191,8 +196,7 @@ def _compass(
     except NotAssessableError as error:
         rows.append(AidRow("magnetic heading", topic, False, str(error.found)))
         return None
-    name: AidName = "magnetic heading"
-    rows.append(AidRow(name, topic, True, "by the deviation that the aircraft file states"))
+    rows.append(AidRow("magnetic heading", topic, True, "by the deviation that the aircraft file states"))
     nothing = np.full(len(time_s), np.nan)
     field = np.column_stack([table.values(one) if is_field else nothing for one in FIELD])
     heading = nothing if is_field else table.values("magnetic_heading_deg")

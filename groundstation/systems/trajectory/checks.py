@@ -43,12 +43,13 @@ def innovations_of(estimate: Estimate) -> tuple[InnovationRow, ...]:
     for kind, name in SENSORS.items():
         used = (solved.mark == 1) & (kinds == kind)
         if used.any():
-            expected = solved.S[used]
-            if kind == HEADING:  # an observation is as sure as stated, but for all of them together
+            expected, low = solved.S[used], InnovationRow.low
+            if kind == HEADING:  # an observation is as sure as stated; it has one error, which may be small
+                low = 0.0
                 stated = np.repeat(estimate.result.plan.seen.variance[:, :1], 3, axis=0)[used, 0]
                 expected = expected - stated + estimate.problem.heading_sigma_rad**2
             ratio = float(np.mean(solved.y[used] ** 2 / expected))
-            rows.append(InnovationRow(name, ratio, int(used.sum())))
+            rows.append(InnovationRow(name, ratio, int(used.sum()), low))
     return tuple(rows)
 
 

@@ -14,7 +14,7 @@ OutageTruth = Literal["undisturbed solution", "RTK"]
 class RaisedSigma:
     """Factor by which sigmas were raised, 1 where they held, and what asked for it."""
 
-    name: Literal["position", "velocity", "tilt", "heading"]
+    name: Literal["position", "height", "velocity", "tilt", "heading"]
     factor: float
     reason: str = ""
 

@@ -11,7 +11,7 @@ from groundstation.base.findings import Finding
 from groundstation.results.gates import Gate, judged_gate
 from groundstation.systems.known import Known
 from groundstation.systems.trajectory import checks, figures, judge, tell
-from groundstation.systems.trajectory.aids_input import aids_of
+from groundstation.systems.trajectory.aids_input import Aids, aids_of
 from groundstation.systems.trajectory.answer import BestTrajectory, TrajectoryState, UnitMounting
 from groundstation.systems.trajectory.checks_answer import HeadingHypothesis, InnovationRow
 from groundstation.systems.trajectory.estimate import Estimate
@@ -71,18 +71,25 @@ def solve(
         may_roll=vehicle == "rolls",
         may_stop=vehicle in ("rolls", "walks"),
         latency_s=lag_s if np.isfinite(lag_s) and abs(lag_s) > COARSE_LAG_S else 0.0,
-        aids=aids_of(
-            flight,
-            known,
-            gathered.gnss,
-            settings.aids,
-            rolls=vehicle == "rolls",
-            is_mounted=mounting.source not in ("case", "refused"),
-        ),
+        aids=aids_beside(flight, known, gathered, mounting, settings),
         aid_settings=settings.aids,
         ambiguous_below=settings.ambiguous_below,
     )
     return _answered(flight, gathered, mounting, segments, settings, vehicle or "")
+
+
+def aids_beside(
+    flight: "Flight", known: Known, gathered: Gathered, mounting: Mounting, settings: TrajectorySettings
+) -> Aids:
+    """Return the aids of a flight beside GNSS."""
+    return aids_of(
+        flight,
+        known,
+        gathered.gnss,
+        settings.aids,
+        rolls=known.phases.vehicle.kind == "rolls",
+        is_mounted=mounting.source not in ("case", "refused"),
+    )
 
 
 def mounting_of(flight: "Flight", known: Known, gathered: Gathered, settings: TrajectorySettings) -> Mounting:
@@ -195,7 +202,7 @@ def _answered(
         innovations=innovations,
         held_out=checks.held_out(main),
         own_track=own,
-        outages=judge.outage_rows(outages, factors.position),
+        outages=judge.outage_rows(outages, factors.position, factors.height),
         outage_truth="RTK" if gathered.gnss_facts.precise_share > 0.9 else "undisturbed solution",
         hypotheses=hypotheses,
         aids=longest.aids,
@@ -276,7 +283,7 @@ def _gates(
             (None, settings.heading_sigma_max_deg), "heading_sigma", "sigma of the heading", sigma_deg, unit="deg"
         )
     )
-    for name in ("position", "velocity", "tilt", "heading"):
+    for name in ("position", "height", "velocity", "tilt", "heading"):
         bound = (None, settings.raised_doubt)
         gates.append(judged_gate(bound, f"raised_{name}", f"factor on sigmas of {name}", getattr(factors, name)))
     return tuple(gates)
@@ -355,13 +362,10 @@ def _findings(gathered: Gathered, answer: BestTrajectory) -> tuple[Finding, ...]
         )
         + tuple(
             Finding(
-                "warn" if row.is_wrong else "info",
-                f"trajectory.{row.name.replace(' ', '_')}",
-                f"{row.topic or row.name} does not aid: {row.reason}",
-                row.topic,
+                "warn", f"trajectory.{row.name.replace(' ', '_')}", f"{row.topic} does not aid: {row.reason}", row.topic
             )
             for row in answer.aids
-            if not row.is_used
+            if row.is_wrong
         )
         + tuple(Finding("warn", f"trajectory.{answer.state}", reason, answer.imu) for reason in answer.reasons[:1])
     )
