@@ -65,6 +65,11 @@ class AircraftData:
     imu_mounting_deg : three floats or None
         Roll, pitch and yaw of the case of the inertial unit in the airframe: the attitude that the case has while the
         airframe is level and points north. None: as the log tells or its motion shows.
+    compass_deviation_deg : five floats or None
+        A to E of the deviation, which is added to the compass heading c for the magnetic one: A + B sin c + C cos c +
+        D sin 2c + E cos 2c. None: not stated.
+    compass_sigma_deg : float
+        Sigma of the magnetic heading so corrected; its error lasts.
     vehicle : str
         ``rolls``, ``flies``, ``walks`` or ``floats``; empty: as the log says or shows. What rolls is always on the
         ground: nothing need prove it.
@@ -89,6 +94,8 @@ class AircraftData:
     ins_alignment: str = ""
     nav_start_utc: str = ""
     imu_mounting_deg: tuple[float, float, float] | None = number(None, -360.0, 360.0)
+    compass_deviation_deg: tuple[float, float, float, float, float] | None = number(None, -180.0, 180.0)
+    compass_sigma_deg: float = number(3.0, 0.1, 45.0)
     vehicle: Literal["", VehicleKind] = ""
     always_on_ground: bool = False
 

@@ -1,6 +1,6 @@
 """Log of an inertial unit as ArduPilot writes it: DataFlash.
 
-Increments are in IMT, samples in IMU, fixes in GPS and GPA.
+Increments are in IMT, samples in IMU, fixes in GPS and GPA, the barometer in BARO.
 
 Source: ArduPilot 4.5, libraries/AP_Logger/LogStructure.h and libraries/AP_GPS/LogStructure.h.
 """
@@ -12,6 +12,7 @@ import numpy as np
 from groundstation.base.records import Int64Array
 from groundstation.base.timescales import GPS_EPOCH_NS
 from groundstation.base.units import NS_PER_S
+from groundstation.simulation.imu.aids import pressure_pa
 from groundstation.simulation.imu.flight import ImuFlight
 from groundstation.simulation.imu.packed import Packed, joined, records
 from groundstation.simulation.imu.scenario import ImuScenario
@@ -63,9 +64,17 @@ GPA: Layout = (
     "s#-mmnd-ssm--",
     "F-BBBB0-CCF--",
 )
+BARO: Layout = (
+    138,
+    "BARO",
+    "QBfffcfIffB",
+    "TimeUS,I,Alt,AltAMSL,Press,Temp,CRt,SMS,Offset,GndTemp,H",
+    "s#mmPOnsmO-",
+    "F-000B0C00-",
+)
 _UNITS = {"s": "s", "d": "deg", "D": "deglatitude", "U": "deglongitude", "m": "m", "n": "m/s", "r": "rad"}
 _UNITS |= {"E": "rad/s", "o": "m/s/s", "h": "degheading", "#": "instance", "-": "", "S": "satellites"}
-_UNITS |= {"O": "degC", "z": "Hz"}
+_UNITS |= {"O": "degC", "z": "Hz", "P": "Pa"}
 _MULTIPLIERS = {"-": 0.0, "0": 1.0, "B": 1e-2, "C": 1e-3, "F": 1e-6, "G": 1e-7}
 FIX_3D, FIX_RTK = 3, 6
 
@@ -73,7 +82,7 @@ FIX_3D, FIX_RTK = 3, 6
 def write_dataflash(path: Path, flight: ImuFlight, scenario: ImuScenario) -> None:
     """Write the log as DataFlash; a unit that does not integrate is in IMU."""
     unit = IMT if flight.is_integral else IMU
-    layouts = (FMT, UNIT, MULT, FMTU, PARM, MSG, unit, GPS, GPA)
+    layouts = (FMT, UNIT, MULT, FMTU, PARM, MSG, unit, GPS, GPA, *([BARO] if len(flight.aids.baro_s) else []))
     head = b"".join(_format(layout).tobytes() for layout in layouts)
     head += b"".join(_rows(UNIT, 1, Id=ord(code), Label=text.encode()).tobytes() for code, text in _UNITS.items())
     head += b"".join(_rows(MULT, 1, Id=ord(code), Mult=factor).tobytes() for code, factor in _MULTIPLIERS.items())
@@ -84,11 +93,16 @@ def write_dataflash(path: Path, flight: ImuFlight, scenario: ImuScenario) -> Non
     head += _rows(MSG, 1, TimeUS=start_us, Message=b"ArduPlane V4.5.7 (simulated)").tobytes()
     head += _rows(PARM, 1, TimeUS=start_us, Name=b"AHRS_ORIENTATION", Value=0.0, Default=0.0).tobytes()
     gps_us = BOOT_US + nanoseconds(flight.gnss.time_s) // 1000
+    aids = flight.aids
+    baro_us = BOOT_US + nanoseconds(aids.baro_s) // 1000
     streams = [
         (np.maximum.accumulate(stamp_us), _increments(flight, stamp_us) if unit is IMT else _samples(flight, stamp_us)),
         (gps_us, _gps(flight, scenario, gps_us)),
         (gps_us, _accuracies(flight, gps_us)),
     ]
+    if len(baro_us):
+        press, alt = pressure_pa(aids.pressure_altitude_m), aids.pressure_altitude_m
+        streams.append((baro_us, _rows(BARO, len(baro_us), TimeUS=baro_us, Alt=alt - alt[0], Press=press, H=1)))
     path.write_bytes(head + joined(streams))
 
 

@@ -1,11 +1,13 @@
 """Simulated flight of an inertial unit with GNSS: its log, and the truth behind it."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.records import frozen
+from groundstation.base.timescales import iso_to_utc_ns
+from groundstation.simulation.imu.aids import SimulatedAids, sense
 from groundstation.simulation.imu.families import Family, motion_of
 from groundstation.simulation.imu.imu_class import load_imu_class
 from groundstation.simulation.imu.motion import Motion, Origin, true_states
@@ -14,6 +16,7 @@ from groundstation.simulation.imu.settings import ImuSettings
 from groundstation.simulation.imu.unit import case_from_body, draw_errors, measured, outside, stamps
 
 FloatArray = NDArray[np.float64]
+START_UTC_NS = iso_to_utc_ns("2026-05-04T06:00:00Z")[0]
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,7 @@ class ImuFlight:
         Antenna from the unit, forward, right, down of the body.
     latency_s : float
         Of the fixes: stamp - validity.
+    aids : SimulatedAids
     """
 
     family: Family
@@ -76,6 +80,7 @@ class ImuFlight:
     case_from_body: FloatArray
     lever_arm_m: FloatArray
     latency_s: float
+    aids: SimulatedAids = field(default_factory=SimulatedAids)
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -83,10 +88,17 @@ class ImuFlight:
                 object.__setattr__(self, item.name, frozen(value))
 
 
-def simulate_imu(family: Family, rng: np.random.Generator | int, *, settings: ImuSettings | None = None) -> ImuFlight:
+def simulate_imu(
+    family: Family,
+    rng: np.random.Generator | int,
+    *,
+    settings: ImuSettings | None = None,
+    start_utc_ns: int = START_UTC_NS,
+) -> ImuFlight:
     """Simulate the log of an inertial unit with GNSS.
 
-    Motion, unit and receiver draw from streams of their own: the same seed gives the same motion with other errors.
+    Motion, unit, receiver and aids draw from streams of their own: the same seed gives the same motion with other
+    errors.
 
     Parameters
     ----------
@@ -94,6 +106,8 @@ def simulate_imu(family: Family, rng: np.random.Generator | int, *, settings: Im
     rng : numpy.random.Generator or int
         A seed where it is a number.
     settings : ImuSettings, optional
+    start_utc_ns : int
+        Date of the magnetic field.
 
     Raises
     ------
@@ -107,7 +121,7 @@ def simulate_imu(family: Family, rng: np.random.Generator | int, *, settings: Im
     ((1500, 3), (150,))
     """
     chosen = ImuSettings() if settings is None else settings
-    of_motion, of_unit, of_noise, of_stamps, of_gnss = np.random.default_rng(rng).spawn(5)
+    of_motion, of_unit, of_noise, of_stamps, of_gnss, of_aids = np.random.default_rng(rng).spawn(6)
     origin = Origin(chosen.latitude_deg, chosen.longitude_deg, chosen.height_m)
     motion = motion_of(family, of_motion, origin, chosen.duration_s, chosen.slip_deg_per_mps2)
     step_s = 1.0 / chosen.rate_hz
@@ -142,4 +156,5 @@ def simulate_imu(family: Family, rng: np.random.Generator | int, *, settings: Im
         case_from_body(chosen.mounting),
         np.array(chosen.mounting.lever_arm_m),
         chosen.gnss.latency_s,
+        sense(motion, of_aids, settings=chosen, start_utc_ns=start_utc_ns),
     )

@@ -78,4 +78,9 @@ def load_imu_scenario(name_or_path: str | Path) -> ImuScenario:
 
 def fly(scenario: ImuScenario, seed: int | None = None) -> ImuFlight:
     """Simulate a scenario, with a seed in place of its own where one is given."""
-    return simulate_imu(scenario.family, scenario.seed if seed is None else seed, settings=scenario.unit)
+    return simulate_imu(
+        scenario.family,
+        scenario.seed if seed is None else seed,
+        settings=scenario.unit,
+        start_utc_ns=scenario.start_utc_ns,
+    )

@@ -82,8 +82,62 @@ class MountingSettings:
 
 
 @dataclass(frozen=True)
+class BarometerSettings:
+    """Barometer: pressure altitude with white noise, gusts and a drift.
+
+    Both are Gauss-Markov. Without rate there is none.
+
+    ``scale`` is what the air of the day makes of a climb; ``offset_m`` the weather.
+    """
+
+    rate_hz: float = number(0.0, 0.0, 200.0)
+    noise_m: float = number(0.2, 0.0, 100.0)
+    gust_m: float = number(0.4, 0.0, 100.0)
+    gust_s: float = number(5.0, 0.0, 1000.0)
+    drift_m: float = number(4.0, 0.0, 1000.0)
+    drift_s: float = number(1800.0, 0.1, 1e6)
+    scale: float = number(1.02, 0.5, 2.0)
+    offset_m: float = number(-40.0, -1000.0, 1000.0)
+    latency_s: float = number(0.1, 0.0, 10.0)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+@dataclass(frozen=True)
+class WheelSettings:
+    """Speed of the wheels along the nose; without rate there is none."""
+
+    rate_hz: float = number(0.0, 0.0, 200.0)
+    scale: float = number(1.015, 0.1, 10.0)
+    noise_mps: float = number(0.05, 0.0, 10.0)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+@dataclass(frozen=True)
+class CompassSettings:
+    """Magnetometer of three axes in the field of the Earth and of the vehicle.
+
+    Without rate there is none.
+
+    ``deviation_deg`` is A to E of what is to be added to its heading; ``error_deg`` what they leave (Gauss-Markov).
+    """
+
+    rate_hz: float = number(0.0, 0.0, 200.0)
+    deviation_deg: tuple[float, float, float, float, float] = (1.0, 4.0, -3.0, 1.5, 0.5)
+    error_deg: float = number(2.0, 0.0, 45.0)
+    error_s: float = number(300.0, 0.1, 1e6)
+    noise_nt: float = number(150.0, 0.0, 1e5)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+@dataclass(frozen=True)
 class ImuSettings:
-    """Settings of a simulated log: motion, unit, mounting, stamps, receiver.
+    """Settings of a simulated log: motion, unit, mounting, stamps, receiver, aids.
 
     ``scale_factor`` and ``misalignment_deg`` are sigmas in place of the class's. ``error_factor`` multiplies every
     error of the unit; 0 is a perfect one. ``is_integral`` false: samples at the ends of the intervals, times the
@@ -105,6 +159,9 @@ class ImuSettings:
     stamps: StampSettings = field(default_factory=StampSettings)
     mounting: MountingSettings = field(default_factory=MountingSettings)
     gnss: ReceiverSettings = field(default_factory=ReceiverSettings)
+    barometer: BarometerSettings = field(default_factory=BarometerSettings)
+    wheels: WheelSettings = field(default_factory=WheelSettings)
+    compass: CompassSettings = field(default_factory=CompassSettings)
 
     def __post_init__(self) -> None:
         check_ranges(self)

@@ -24,19 +24,24 @@ RESOLUTION: Mapping[str, float] = {
     **{f"imu.accel_{axis}_mps2": 1e-7 for axis in "xyz"},
     **{f"{topic}.{axis}_deg": 1e-9 for topic in ("gnss", "truth") for axis in ("latitude", "longitude")},
     **{f"{topic}.altitude_ellipsoid_m": 1e-4 for topic in ("gnss", "truth")},
+    "baro.pressure_altitude_m": 1e-3,
+    "odometry.speed_mps": 1e-4,
+    **{f"magnetometer.field_{axis}_nt": 0.1 for axis in ("forward", "right", "down")},
     **{f"truth.{angle}_deg": 1e-5 for angle in ("roll", "pitch", "true_heading")},
 }
 
 
 def log_tables(flight: ImuFlight, scenario: ImuScenario) -> Flight:
-    """Put a log into tables ``imu``, ``gnss`` and ``truth``.
+    """Put a log into tables ``imu``, ``gnss``, ``truth``, and those of its aids.
 
     The truth has the rate that the scenario says. Rows are numbered in the order in which they were logged: that of
     their stamps, but for stamps that step back.
     """
     columns = {"imu": imu_columns(flight), "gnss": gnss_columns(flight)}
-    stamp_s = {"imu": flight.time_s, "gnss": flight.gnss.time_s}
-    logged_s = {"imu": np.maximum.accumulate(flight.time_s), "gnss": flight.gnss.time_s}
+    stamp_s: dict[str, FloatArray] = {"imu": flight.time_s, "gnss": flight.gnss.time_s}
+    logged_s: dict[str, FloatArray] = {"imu": np.maximum.accumulate(flight.time_s), "gnss": flight.gnss.time_s}
+    for topic, (times_s, found) in aid_columns(flight).items():
+        columns[topic], stamp_s[topic], logged_s[topic] = found, times_s, times_s
     if scenario.truth_rate_hz > 0.0:
         stamp_s["truth"] = np.arange(0.0, flight.settings.duration_s, 1.0 / scenario.truth_rate_hz)
         logged_s["truth"] = stamp_s["truth"]
@@ -91,6 +96,20 @@ def gnss_columns(flight: ImuFlight) -> dict[str, NDArray[np.generic]]:
         **{f"velocity_{axis}_sigma_mps": one for axis, one in zip(AXES, velocity.T, strict=True)},
         "fix": np.where(fixes.is_precise, "rtk_fixed", "3d"),
     }
+
+
+def aid_columns(flight: ImuFlight) -> dict[str, tuple[FloatArray, dict[str, NDArray[np.generic]]]]:
+    """Return times and columns of the topics of aids that the log has."""
+    aids = flight.aids
+    found: dict[str, tuple[FloatArray, dict[str, NDArray[np.generic]]]] = {}
+    if len(aids.baro_s):
+        found["baro"] = aids.baro_s, {"pressure_altitude_m": aids.pressure_altitude_m}
+    if len(aids.wheel_s):
+        found["odometry"] = aids.wheel_s, {"speed_mps": aids.speed_mps}
+    if len(aids.compass_s):
+        axes = zip(("forward", "right", "down"), aids.field_nt.T, strict=True)
+        found["magnetometer"] = aids.compass_s, {f"field_{axis}_nt": one for axis, one in axes}
+    return found
 
 
 def truth_columns(flight: ImuFlight, time_s: FloatArray) -> dict[str, NDArray[np.generic]]:

@@ -1,8 +1,8 @@
 """Log of an inertial unit as PX4 writes it: ULog.
 
-Increments are in vehicle_imu, fixes in vehicle_gps_position.
+Increments are in vehicle_imu, fixes in vehicle_gps_position, the barometer in vehicle_air_data.
 
-Source: PX4 User Guide, ULog File Format; fields of msg/VehicleImu.msg and msg/SensorGps.msg of PX4 1.14.
+Source: PX4 User Guide, ULog File Format; fields of VehicleImu, SensorGps and VehicleAirData of PX4 1.14.
 """
 
 import struct
@@ -12,6 +12,7 @@ import numpy as np
 
 from groundstation.base.records import Int64Array
 from groundstation.base.version import __version__
+from groundstation.simulation.imu.aids import pressure_pa
 from groundstation.simulation.imu.flight import ImuFlight
 from groundstation.simulation.imu.packed import Packed, joined, records
 from groundstation.simulation.imu.scenario import ImuScenario
@@ -37,6 +38,10 @@ GPS = (
     "float heading_offset;float heading_accuracy;uint16_t automatic_gain_control;uint8_t fix_type;"
     "uint8_t jamming_state;uint8_t spoofing_state;bool vel_ned_valid;uint8_t satellites_used;"
 )
+AIR = (
+    "uint64_t timestamp;uint64_t timestamp_sample;uint32_t baro_device_id;float baro_alt_meter;float baro_temp_celcius;"
+    "float baro_pressure_pa;float rho;"
+)
 FIX_3D, FIX_RTK = 3, 6
 
 
@@ -60,6 +65,9 @@ def write_ulog(path: Path, flight: ImuFlight, scenario: ImuScenario) -> None:
         step_s = flight.interval_s[:, None]
         rows.append((logged_us, _samples(RATES, stamp_us, flight.delta_angle_rad / step_s, 1)))
         rows.append((logged_us, _samples(FORCES, stamp_us, flight.delta_velocity_mps / step_s, 2)))
+    if len(flight.aids.baro_s):
+        layouts["vehicle_air_data"] = AIR
+        rows.append(_air(flight, len(layouts) - 1))
     head = [MAGIC + struct.pack("<Q", BOOT_US), _message("B", bytes(40))]
     head += [_message("F", f"{name}:{layout}".encode()) for name, layout in layouts.items()]
     head += [_info("sys_name", "PX4"), _info("ver_sw_release", "simulated"), _info("sys_toolchain", __version__)]
@@ -103,6 +111,16 @@ def _imu(flight: ImuFlight, stamp_us: Int64Array, number: int) -> Packed:
 
 def _samples(layout: str, stamp_us: Int64Array, values: np.ndarray, number: int) -> Packed:
     return _data(layout, number, len(stamp_us), timestamp=stamp_us, timestamp_sample=stamp_us, xyz=values)
+
+
+def _air(flight: ImuFlight, number: int) -> tuple[Int64Array, Packed]:
+    stamp_us = BOOT_US + nanoseconds(flight.aids.baro_s) // 1000
+    altitude_m = flight.aids.pressure_altitude_m
+    stamps = {"timestamp": stamp_us, "timestamp_sample": stamp_us}
+    found = _data(
+        AIR, number, len(stamp_us), **stamps, baro_alt_meter=altitude_m, baro_pressure_pa=pressure_pa(altitude_m)
+    )
+    return stamp_us, found
 
 
 def _gps_us(flight: ImuFlight) -> Int64Array:

@@ -10,6 +10,7 @@ from groundstation.results.arrays.typed import found_in
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
 from groundstation.results.roles import ErrorsOfFilter, FilterError, FilterWrong, StatesAlongTheFlight
+from groundstation.systems.trajectory.aids_answer import AidRow
 from groundstation.systems.trajectory.checks_answer import (
     AgainstOwnTrack,
     HeadingHypothesis,
@@ -153,6 +154,8 @@ class BestTrajectory(Answer, StatesAlongTheFlight, ErrorsOfFilter):
     outage_truth : {'undisturbed solution', 'RTK'}
     hypotheses : tuple of HeadingHypothesis
         The best first; that of the solution.
+    aids : tuple of AidRow
+        Barometer, wheels, magnetic heading of the log, used or not.
     onboard : OnboardErrors or None
     separation : tuple of SeparationRow
     """
@@ -181,6 +184,7 @@ class BestTrajectory(Answer, StatesAlongTheFlight, ErrorsOfFilter):
     outages: tuple[OutageRow, ...] = ()
     outage_truth: OutageTruth = "undisturbed solution"
     hypotheses: tuple[HeadingHypothesis, ...] = ()
+    aids: tuple[AidRow, ...] = ()
     onboard: OnboardErrors | None = None
     separation: tuple[SeparationRow, ...] = ()
     settings: dict[str, Any] = field(default_factory=dict)

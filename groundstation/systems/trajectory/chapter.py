@@ -58,6 +58,7 @@ def trajectory(results: FlightResults) -> Section | None:
         _outages(answer),
         Figure("trajectory.outages"),
         _checks(answer),
+        _aids(answer),
         _parameters(answer),
     ]
     appendix: list[Part | None] = [
@@ -191,7 +192,7 @@ def _outages(answer: BestTrajectory) -> Grid | None:
     heads = (
         *(Head("Without GNSS, s", True), Head("Outages", True), Head("Smoothed, largest inside, RMS", True)),
         *(Head("Forward filter at the end, RMS", True), Head("Inside 95 %", True), Head("RMS error / σ", True)),
-        Head("Replayed, s", True),
+        *(Head("Height, largest inside, RMS", True), Head("Inside 95 %", True), Head("Replayed, s", True)),
     )
     rows = [
         (
@@ -201,11 +202,13 @@ def _outages(answer: BestTrajectory) -> Grid | None:
             _with(one.forward_end_rms_m, "m"),
             percent(one.inside95_share),
             number(one.rms_over_sigma, 2),
+            _with(one.vertical_rms_m, "m"),
+            ABSENT if one.vertical_inside95_share is None else percent(one.vertical_inside95_share),
             number(one.seconds, 0),
         )
         for one in answer.outages
     ]
-    caption = f"GNSS is withheld from this log; truth is the {answer.outage_truth}. Horizontal."
+    caption = f"GNSS is withheld from this log; truth is the {answer.outage_truth}. Horizontal, but for the height."
     if answer.outage_truth == "undisturbed solution":
         caption += " It is the same solution with GNSS: what GNSS itself has wrong is in both."
     return Grid("Outages of GNSS, replayed", heads, rows, caption, ("trajectory_outages",))
@@ -221,6 +224,22 @@ def _checks(answer: BestTrajectory) -> Grid | None:
     heads = (Head("Check"), Head("Found", True), Head("Expected", True), Head("n", True), Head("State"))
     caption = "Held out: every tenth run of GNSS, kept from the solution. Innovations: mean square over expected."
     return Grid("Checks on the log itself", heads, rows, caption, ("trajectory_residuals",)) if rows else None
+
+
+def _aids(answer: BestTrajectory) -> Grid | None:
+    if not answer.aids:
+        return None
+    rows: list[tuple[Cell, ...]] = [
+        (
+            _capital(one.name),
+            one.topic or ABSENT,
+            Mark("good", "yes") if one.is_used else Mark("warn" if one.is_wrong else "unknown", "no"),
+            typeset(one.reason),
+        )
+        for one in answer.aids
+    ]
+    heads = (Head("Aid"), Head("Topic"), Head("Used"), Head("With what, or why not"))
+    return Grid("Aids beside GNSS", heads, rows, "An aid that does not fit is left out: the answer is that without it.")
 
 
 def _innovation(row: InnovationRow) -> tuple[Cell, ...]:

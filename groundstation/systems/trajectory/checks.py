@@ -19,6 +19,7 @@ from groundstation.systems.trajectory.states import (
     NO_SLIP,
     POSITION,
     VELOCITY,
+    WHEEL,
 )
 
 SENSORS = {
@@ -27,6 +28,7 @@ SENSORS = {
     NO_SLIP: "no sideways or upward motion",
     HEIGHT: "barometric height",
     HEADING: "magnetic heading",
+    WHEEL: "wheel speed",
 }
 HELD_S, HELD_EVERY_S = 10.0, 100.0
 BLOCK_S = 100.0
@@ -41,8 +43,13 @@ def innovations_of(estimate: Estimate) -> tuple[InnovationRow, ...]:
     for kind, name in SENSORS.items():
         used = (solved.mark == 1) & (kinds == kind)
         if used.any():
-            ratio = float(np.mean(solved.y[used] ** 2 / solved.S[used]))
-            rows.append(InnovationRow(name, ratio, int(used.sum())))
+            expected, low = solved.S[used], InnovationRow.low
+            if kind == HEADING:  # an observation is as sure as stated; it has one error, which may be small
+                low = 0.0
+                stated = np.repeat(estimate.result.plan.seen.variance[:, :1], 3, axis=0)[used, 0]
+                expected = expected - stated + estimate.problem.heading_sigma_rad**2
+            ratio = float(np.mean(solved.y[used] ** 2 / expected))
+            rows.append(InnovationRow(name, ratio, int(used.sum()), low))
     return tuple(rows)
 
 

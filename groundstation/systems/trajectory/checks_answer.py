@@ -14,7 +14,7 @@ OutageTruth = Literal["undisturbed solution", "RTK"]
 class RaisedSigma:
     """Factor by which sigmas were raised, 1 where they held, and what asked for it."""
 
-    name: Literal["position", "velocity", "tilt", "heading"]
+    name: Literal["position", "height", "velocity", "tilt", "heading"]
     factor: float
     reason: str = ""
 
@@ -80,6 +80,8 @@ class OutageRow:
         RMS error over RMS sigma.
     seconds : float
         Replayed altogether.
+    vertical_rms_m, vertical_inside95_share : float or None
+        Likewise of the height.
     """
 
     length_s: float
@@ -89,6 +91,8 @@ class OutageRow:
     inside95_share: float
     rms_over_sigma: float
     seconds: float
+    vertical_rms_m: float | None = None
+    vertical_inside95_share: float | None = None
 
 
 @dataclass(frozen=True)

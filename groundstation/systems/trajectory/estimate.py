@@ -33,7 +33,6 @@ from groundstation.systems.trajectory.score import Scored, Variances, score_of, 
 from groundstation.systems.trajectory.start import starts_at
 from groundstation.systems.trajectory.states import (
     ATT,
-    BARO,
     LAG,
     LAT,
     LEV,
@@ -41,6 +40,8 @@ from groundstation.systems.trajectory.states import (
     NO_SLIP,
     SG,
     SLOW,
+    STATES,
+    WHEEL,
     FloatArray,
     Gate,
     Noise,
@@ -78,6 +79,9 @@ class Problem:
     lag_s: float = 0.0
     sigmas: StartSigmas = field(default_factory=StartSigmas)
     has_slip: bool = False
+    has_baro: bool = False
+    has_wheels: bool = False
+    heading_sigma_rad: float = 0.0  # of a magnetic heading; its observations are weaker, as they say the same
 
     def plan(self, model: Model) -> Plan:
         """Return the epochs and the measurements with the variances of a model."""
@@ -89,12 +93,19 @@ class Problem:
 
     def variances(self, model: Model) -> FloatArray:
         """Return the variances of the constants at the start."""
-        return self.sigmas.variances(self.noise(model), model, has_latency=True, has_slip=self.has_slip, has_baro=False)
+        return self.sigmas.variances(
+            self.noise(model),
+            model,
+            has_latency=True,
+            has_slip=self.has_slip,
+            has_baro=self.has_baro,
+            has_wheels=self.has_wheels,
+        )
 
     def restarted(self, start: Start, model: Model) -> Start:
         """Return a start with the variances of a model."""
         variances, p = self.variances(model), start.p.copy()
-        for at in (*range(SG, LEV), *range(SLOW, BARO)):
+        for at in (*range(SG, LEV), *range(SLOW, STATES)):
             p[at, :] = p[:, at] = 0.0
             p[at, at] = variances[at]
         return replace(start, p=p)
@@ -353,16 +364,17 @@ def estimate(
             model = found.model
             start, done = _at(problem, model, rules, problem.restarted(start, model))
     done = relinearised(problem, model, rules, done)
-    last = hypotheses_of(_without_slip(problem), model, rules)
+    last = hypotheses_of(without_slip(problem), model, rules)
     return Estimate(problem, model, found, last, done, rules, travel)
 
 
-def _without_slip(problem: Problem) -> Problem:
+def without_slip(problem: Problem) -> Problem:
     """Return the problem without what was learned of the direction of travel.
 
     It would favour the heading that it is of.
     """
-    return replace(problem, seen=problem.seen.take(problem.seen.kind != NO_SLIP), has_slip=False)
+    seen = problem.seen.take(~np.isin(problem.seen.kind, (NO_SLIP, WHEEL)))
+    return replace(problem, seen=seen, has_slip=False, has_wheels=False)
 
 
 def _at(problem: Problem, model: Model, rules: Gate, start: Start) -> tuple[Start, Pass]:

@@ -13,7 +13,7 @@ from groundstation.systems.known import Known
 from groundstation.systems.trajectory.gather import gather
 from groundstation.systems.trajectory.imu_samples import SUBJECT
 from groundstation.systems.trajectory.settings import TrajectorySettings
-from groundstation.systems.trajectory.solve import mounting_of, require_enough
+from groundstation.systems.trajectory.solve import aids_beside, mounting_of, require_enough
 from groundstation.tables.table import Flight
 
 ENOUGH_HZ = 1.0  # of GNSS
@@ -119,6 +119,8 @@ def examine_trajectory(flight: Flight, known: Known, settings: TrajectorySetting
         found.append(Shortfall(f"{text} is told; state imu_mounting_deg in the aircraft file"))
     elif mounting.doubt:
         found.append(Shortfall(mounting.doubt))
+    aids = aids_beside(flight, known, gathered, mounting, settings)
+    found += [Shortfall(f"{one.topic}: {one.name} does not aid: {one.reason}") for one in aids.rows if one.is_wrong]
     return tuple(found)
 
 

@@ -25,6 +25,7 @@ from groundstation.methods.kalman.kernels import (
 )
 from groundstation.systems.trajectory.observe import NO_ROW, observe
 from groundstation.systems.trajectory.states import (
+    AIDS,
     BA,
     BARO,
     BG,
@@ -169,7 +170,7 @@ def update(
         return 0.0
     if squared > gate.largest * count:
         now.in_a_row[kind] += 1
-        if now.in_a_row[kind] < gate.patience:
+        if now.in_a_row[kind] < gate.patience or kind >= AIDS:
             if keeps:
                 for i in range(3):
                     solved.mark[3 * m + i] = -1

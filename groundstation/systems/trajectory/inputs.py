@@ -1,6 +1,6 @@
 """Input of the trajectory estimator: increments of an inertial unit, fixes of a receiver."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,7 +74,79 @@ class GnssFixes:
         return len(self.time_s)
 
 
-def _freeze(table: ImuIncrements | GnssFixes) -> None:
+@dataclass(frozen=True)
+class AidReadings:
+    """Readings of an aid of one number, in order of time.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (k,)
+        Flight time, strictly increasing.
+    value : ndarray, shape (k,)
+        Height above some level, m; speed ahead, m/s.
+    change : ndarray, shape (k,)
+        Its rate of change.
+    """
+
+    time_s: FloatArray
+    value: FloatArray
+    change: FloatArray
+
+    def __post_init__(self) -> None:
+        _freeze(self)
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def take(self, index: BoolArray) -> "AidReadings":
+        """The readings that a mask selects."""
+        return AidReadings(self.time_s[index], self.value[index], self.change[index])
+
+
+@dataclass(frozen=True)
+class CompassReadings:
+    """Readings of a compass whose deviation is stated, in order of time.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (k,)
+        Flight time, strictly increasing.
+    field_nt : ndarray, shape (k, 3)
+        Along body axes; NaN where the compass gives a heading itself.
+    heading_deg : ndarray, shape (k,)
+        Of the compass; NaN where it is to be levelled.
+    declination_deg : ndarray, shape (k,)
+    deviation_deg : tuple of five floats
+        A to E of what is added to the compass.
+    sigma_deg : float
+        Of the heading so corrected; its error lasts.
+    """
+
+    time_s: FloatArray
+    field_nt: FloatArray
+    heading_deg: FloatArray
+    declination_deg: FloatArray
+    deviation_deg: tuple[float, float, float, float, float]
+    sigma_deg: float
+
+    def __post_init__(self) -> None:
+        _freeze(self)
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def take(self, index: BoolArray) -> "CompassReadings":
+        """The readings that a mask selects."""
+        return replace(
+            self,
+            time_s=self.time_s[index],
+            field_nt=self.field_nt[index],
+            heading_deg=self.heading_deg[index],
+            declination_deg=self.declination_deg[index],
+        )
+
+
+def _freeze(table: ImuIncrements | GnssFixes | AidReadings | CompassReadings) -> None:
     """Make the arrays of a table read-only."""
     for item in fields(table):
         if isinstance(value := getattr(table, item.name), np.ndarray):

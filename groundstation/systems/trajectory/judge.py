@@ -23,18 +23,24 @@ class Factors:
     velocity: float = 1.0
     tilt: float = 1.0
     heading: float = 1.0
+    height: float = 1.0
 
 
-def position_factor(outages: Outages) -> float:
+def position_factor(outages: Outages, ratio: FloatArray) -> float:
     """Return the factor that puts 95 % of all outages inside.
 
     Of each length that has ten it puts 90 % inside.
+
+    Parameters
+    ----------
+    ratio : ndarray, shape (n,)
+        Error of each outage over its 95 % bound.
     """
     if len(outages) < FEW:
         return 1.0
-    factor = max(1.0, _quantile(outages.ratio, WANTED))
+    factor = max(1.0, _quantile(ratio, WANTED))
     for length_s in LENGTHS_S:
-        of = outages.ratio[outages.of_length(length_s)]
+        of = ratio[outages.of_length(length_s)]
         if len(of) >= 2 * FEW:
             factor = max(factor, _quantile(of, LEAST_WANTED))
     return factor
@@ -55,7 +61,8 @@ def raised(
     heading_sigma_deg : float
         Median of the sigma on straights, as the filter has it.
     """
-    position = position_factor(outages)
+    position = position_factor(outages, outages.ratio)
+    height = max(position, position_factor(outages, outages.down_ratio))
     velocity = tilt = heading = 1.0
     why_tilt = why_heading = ""
     if len(outages) >= FEW:
@@ -82,11 +89,22 @@ def raised(
         RaisedSigma(
             "position", position, f"{inside:.0%} of {len(outages)} replayed outages inside 95 %" if position > 1 else ""
         ),
+        RaisedSigma(
+            "height",
+            height,
+            (
+                f"{np.mean(outages.down_ratio <= 1.0):.0%} of them inside in height"
+                if height > position
+                else "as position"
+            )
+            if height > 1
+            else "",
+        ),
         RaisedSigma("velocity", velocity, "by replayed outages" if velocity > 1 else ""),
         RaisedSigma("tilt", tilt, why_tilt if tilt > 1 else ""),
         RaisedSigma("heading", heading, why_heading if heading > 1 else ""),
     )
-    return Factors(position, velocity, tilt, heading), rows
+    return Factors(position, velocity, tilt, heading, height), rows
 
 
 def with_factors(track: TrackOfStates, factors: Factors, constant_m: FloatArray) -> TrackOfStates:
@@ -99,14 +117,16 @@ def with_factors(track: TrackOfStates, factors: Factors, constant_m: FloatArray)
     """
     return replace(
         track,
-        position_sigma_m=np.hypot(track.position_sigma_m * factors.position, constant_m),
+        position_sigma_m=np.hypot(
+            track.position_sigma_m * np.array([factors.position, factors.position, factors.height]), constant_m
+        ),
         velocity_sigma_mps=track.velocity_sigma_mps * factors.velocity,
         attitude_sigma_deg=track.attitude_sigma_deg * np.array([factors.tilt, factors.tilt, factors.heading]),
     )
 
 
-def outage_rows(outages: Outages, factor: float) -> tuple[OutageRow, ...]:
-    """Return the outages by length, sigmas raised by a factor."""
+def outage_rows(outages: Outages, factor: float, height: float) -> tuple[OutageRow, ...]:
+    """Return the outages by length, sigmas raised by the factors of position and height."""
     rows = []
     for length_s in LENGTHS_S:
         of = outages.of_length(length_s)
@@ -123,6 +143,8 @@ def outage_rows(outages: Outages, factor: float) -> tuple[OutageRow, ...]:
                 float(np.mean(outages.ratio[of] <= factor)),
                 error / sigma,
                 float(length_s * of.sum()),
+                float(np.sqrt(np.mean(outages.down_m[of] ** 2))),
+                float(np.mean(outages.down_ratio[of] <= height)),
             )
         )
     return tuple(rows)

@@ -11,6 +11,7 @@ from groundstation.systems.trajectory.states import (
     BARO,
     BG,
     FAST,
+    HEIGHT,
     LAG,
     LAT,
     LEV,
@@ -24,6 +25,8 @@ from groundstation.systems.trajectory.states import (
     SLOW,
     STATES,
     VELOCITY,
+    WHEEL,
+    WHL,
     FloatArray,
     Gate,
     Noise,
@@ -31,6 +34,7 @@ from groundstation.systems.trajectory.states import (
 
 DEG = np.pi / 180.0
 HOUR = 3600.0
+AID_LATE_S = 0.1  # sigma of the time of a barometer and of wheels, whose lag is not estimated
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,12 @@ class Model:
     slip_walk_deg_rts : float
         Random walk of the direction of travel in the unit, deg in the square root of a second: slip lasts for seconds
         to minutes, in bends, on a crowned road, by the wind.
+    baro_m : float
+        White error of the barometric height, in means of a second.
+    baro_walk_m_rth : float
+        Random walk of its offset, m in the square root of an hour; its correlation time is an hour.
+    wheel_mps : float
+        White error of the speed of the wheels.
     jitter_s : float
         Sigma of the stamps of GNSS against those of the unit.
     """
@@ -82,6 +92,9 @@ class Model:
     fast_s: float = 10.0
     slip_mps: float = 0.1
     slip_walk_deg_rts: float = 0.05
+    baro_m: float = 0.4
+    baro_walk_m_rth: float = 10.0
+    wheel_mps: float = 0.1
     jitter_s: float = 0.003
     gyro_imperfection: float = 1.0
     accel_imperfection: float = 1.0
@@ -103,8 +116,10 @@ class Model:
                     (self.slip_walk_deg_rts * DEG) ** 2,
                 ]
             ),
-            np.array([self.slow_s, self.fast_s, 3600.0]),
-            np.concatenate([(self.slow_scale * sigma_m) ** 2, (self.fast_scale * sigma_m) ** 2, [25.0]]),
+            np.array([self.slow_s, self.fast_s, HOUR]),
+            np.concatenate(
+                [(self.slow_scale * sigma_m) ** 2, (self.fast_scale * sigma_m) ** 2, [0.5 * self.baro_walk_m_rth**2]]
+            ),
         )
 
     def weighted(self, seen: Observations) -> Observations:
@@ -114,9 +129,12 @@ class Model:
             (POSITION, self.position_scale, self.position_floor_m),
             (VELOCITY, self.velocity_scale, self.velocity_floor_mps),
             (NO_SLIP, self.slip_mps, 0.0),
+            (HEIGHT, self.baro_m, 0.0),
+            (WHEEL, self.wheel_mps, 0.0),
         ):
             of = seen.kind == kind
-            variance[of] = variance[of] * scale**2 + floor**2 + (seen.change[of] * self.jitter_s) ** 2
+            late_s = AID_LATE_S if kind in (HEIGHT, WHEEL) else self.jitter_s
+            variance[of] = variance[of] * scale**2 + floor**2 + (seen.change[of] * late_s) ** 2
         variance[seen.kind == VELOCITY, 2] *= self.velocity_down_scale**2
         return replace(seen, variance=variance)
 
@@ -139,8 +157,12 @@ class StartSigmas:
     latency_s: float = 0.2
     lag_s: float = 0.1
     mounting_deg: float = 5.0
+    baro_m: float = 5.0
+    wheel_scale: float = 0.03
 
-    def variances(self, noise: Noise, model: Model, *, has_latency: bool, has_slip: bool, has_baro: bool) -> FloatArray:
+    def variances(
+        self, noise: Noise, model: Model, *, has_latency: bool, has_slip: bool, has_baro: bool, has_wheels: bool
+    ) -> FloatArray:
         """Return the variances of the states from BG on, shape (STATES,).
 
         Those of navigation are zero.
@@ -158,7 +180,8 @@ class StartSigmas:
         v[SLOW:FAST] = noise.variance[:3]
         v[FAST:MNT] = noise.variance[3:6]
         v[MNT:BARO] = (self.mounting_deg * DEG) ** 2 if has_slip else 0.0
-        v[BARO] = noise.variance[6] if has_baro else 0.0
+        v[BARO] = self.baro_m**2 if has_baro else 0.0
+        v[WHL] = self.wheel_scale**2 if has_wheels else 0.0
         return v
 
 

@@ -1,4 +1,4 @@
-"""Observations of a pass in one list: GNSS, standstill, no slip, barometer."""
+"""Observations of a pass in one list: GNSS, standstill, no slip, aids."""
 
 from dataclasses import dataclass, fields
 from typing import Any
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.systems.trajectory.fix_motion import motion_of
-from groundstation.systems.trajectory.inputs import GnssFixes
+from groundstation.systems.trajectory.inputs import AidReadings, GnssFixes
 from groundstation.systems.trajectory.states import POSITION, VELOCITY
 
 FloatArray = NDArray[np.float64]
@@ -73,6 +73,15 @@ def of_gnss(gnss: GnssFixes) -> Observations:
         np.concatenate([velocity, _slope(gnss.time_s, velocity)]),
     )
     return found.take(np.isfinite(found.value).any(axis=1))
+
+
+def of_readings(readings: AidReadings, kind: int) -> Observations:
+    """Return the readings of an aid of one number; the variance is in units of the model's."""
+    count = len(readings)
+    value, variance, change = (np.full((count, 3), np.nan) for _ in range(3))
+    value[:, 0], variance[:, 0], change[:, 0] = readings.value, 1.0, readings.change
+    kinds = np.full(count, kind, dtype=np.int64)
+    return Observations(readings.time_s, kinds, value, variance, np.zeros(count, dtype=bool), change)
 
 
 def _slope(time_s: FloatArray, values: FloatArray) -> FloatArray:

@@ -28,6 +28,8 @@ from groundstation.systems.trajectory.states import (
     STILL,
     VEL,
     VELOCITY,
+    WHEEL,
+    WHL,
     WIDTH,
     Now,
     Room,
@@ -182,6 +184,27 @@ def observe(m: int, seen: Seen, now: Now, room: Room) -> None:
             else:
                 _put(room, i, 6, MNT, sp * (cy * vy - sy * vx))
                 _put(room, i, 7, MNT + 1, cp * (cy * vx + sy * vy) - sp * vz)
+    elif kind == WHEEL:
+        vx = C[0, 0] * nav[3] + C[1, 0] * nav[4] + C[2, 0] * nav[5]
+        vy = C[0, 1] * nav[3] + C[1, 1] * nav[4] + C[2, 1] * nav[5]
+        vz = C[0, 2] * nav[3] + C[1, 2] * nav[4] + C[2, 2] * nav[5]
+        sy, cy = math.sin(value[MNT]), math.cos(value[MNT])
+        sp, cp = math.sin(value[MNT + 1]), math.cos(value[MNT + 1])
+        scale = 1.0 + value[WHL]
+        n = scale * (cp * (C[0, 0] * cy + C[0, 1] * sy) - C[0, 2] * sp)
+        e = scale * (cp * (C[1, 0] * cy + C[1, 1] * sy) - C[1, 2] * sp)
+        d = scale * (cp * (C[2, 0] * cy + C[2, 1] * sy) - C[2, 2] * sp)
+        ahead = n * nav[3] + e * nav[4] + d * nav[5]
+        y[0] = seen.value[m, 0] - ahead
+        _put(room, 0, 0, VEL, n)
+        _put(room, 0, 1, VEL + 1, e)
+        _put(room, 0, 2, VEL + 2, d)
+        _put(room, 0, 3, ATT, e * nav[5] - d * nav[4])
+        _put(room, 0, 4, ATT + 1, d * nav[3] - n * nav[5])
+        _put(room, 0, 5, ATT + 2, n * nav[4] - e * nav[3])
+        _put(room, 0, 6, MNT, scale * cp * (cy * vy - sy * vx))
+        _put(room, 0, 7, MNT + 1, -scale * (sp * (cy * vx + sy * vy) + cp * vz))
+        _put(room, 0, 8, WHL, ahead / scale)
     elif kind == HEIGHT:
         y[0] = seen.value[m, 0] - (nav[2] + value[BARO])
         _put(room, 0, 0, POS + 2, -1.0)

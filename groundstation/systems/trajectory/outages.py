@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.systems.trajectory.estimate import Estimate
 from groundstation.systems.trajectory.layout import Plan
@@ -51,6 +52,8 @@ class Outages:
         Change of the attitude at the end, rad, about north, east, down.
     attitude_variance : ndarray, shape (n, 3)
         What is to be expected of it: the variance that leaving out the data added.
+    down_m, down_ratio : ndarrays, shape (n,)
+        Largest vertical error of the smoothed solution inside, and it over its 95 % bound.
     """
 
     start_s: FloatArray
@@ -62,6 +65,8 @@ class Outages:
     velocity_ratio: FloatArray
     attitude: FloatArray
     attitude_variance: FloatArray
+    down_m: FloatArray
+    down_ratio: FloatArray
 
     def __len__(self) -> int:
         return len(self.start_s)
@@ -76,9 +81,11 @@ def replay(estimate: Estimate, lengths_s: tuple[float, ...] = LENGTHS_S) -> Outa
     rows: list[tuple[float, ...]] = []
     for length_s in lengths_s:
         rows += _of_length(estimate, length_s)
-    table = np.array(rows, dtype=np.float64).reshape(-1, 15)
+    table = np.array(rows, dtype=np.float64).reshape(-1, 17)
     start, length, error, sigma, ratio, end = table[:, :6].T
-    return Outages(start, length, error, sigma, ratio, end, table[:, 6:9], table[:, 9:12], table[:, 12:15])
+    return Outages(
+        start, length, error, sigma, ratio, end, table[:, 6:9], table[:, 9:12], table[:, 12:15], *table[:, 15:].T
+    )
 
 
 def _of_length(estimate: Estimate, length_s: float) -> list[tuple[float, ...]]:
@@ -136,6 +143,8 @@ def _row(full: Pass, done: Pass, start_s: float, end_s: float) -> tuple[float, .
     at, (n, e) = inside[worst], error[worst, :2]
     a, b, c = done.variance[at, 0], done.variance[at, 1], done.plane[at]
     squared = (b * n * n - 2.0 * c * n * e + a * e * e) / max(a * b - c * c, 1e-12)
+    down = np.abs(error[:, 2])
+    lowest = int(np.argmax(down))
     middle, last = inside[len(inside) // 2], inside[-1]
     moving = done.x[middle, VEL:ATT] - full.x[middle, VEL:ATT]
     forward = done.solved.before[last, :2] - full.x[last, :2]
@@ -149,4 +158,6 @@ def _row(full: Pass, done: Pass, start_s: float, end_s: float) -> tuple[float, .
         *(moving / np.sqrt(np.maximum(done.variance[middle, VEL:ATT], 1e-12))).tolist(),
         *(done.x[last, ATT:NAVIGATION] - full.x[last, ATT:NAVIGATION]).tolist(),
         *np.maximum(done.variance[last, ATT:NAVIGATION] - full.variance[last, ATT:NAVIGATION], 0.0).tolist(),
+        float(down[lowest]),
+        float(down[lowest] / np.sqrt(max(done.variance[inside[lowest], 2], 1e-12)) / NORMAL_95),
     )

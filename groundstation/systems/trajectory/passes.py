@@ -17,6 +17,7 @@ from groundstation.systems.trajectory.states import (
     MNT,
     NAVIGATION,
     STATES,
+    WHL,
     WIDTH,
     FloatArray,
     Gate,
@@ -290,7 +291,7 @@ def line_of(one: Pass) -> Line:
     nav[:, 6:] = turned(nav[:, 6:], correction[:, 6:9])
     value = np.tile(one.constants, (len(nav), 1))
     value[:, NAVIGATION:KEPT_ROWS] = one.linear.value[:, NAVIGATION:KEPT_ROWS] + one.x[:, NAVIGATION:]
-    for first, end in ((LAT, MNT), (BARO, STATES)):
+    for first, end in ((LAT, MNT), (BARO, WHL)):
         value[:, first:end] = 0.0
     return Line(np.ascontiguousarray(nav), np.ascontiguousarray(value))
 

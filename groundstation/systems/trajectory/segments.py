@@ -8,6 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.errors import NotAssessableError
+from groundstation.systems.trajectory.aid_settings import AidSettings
+from groundstation.systems.trajectory.aiding import aided, of_span, used_alone
+from groundstation.systems.trajectory.aids_answer import AidRow
+from groundstation.systems.trajectory.aids_input import Aids
 from groundstation.systems.trajectory.estimate import Estimate, estimate
 from groundstation.systems.trajectory.fix_motion import motion_of
 from groundstation.systems.trajectory.inputs import GnssFixes, ImuIncrements
@@ -23,6 +27,7 @@ class Segment:
     imu: ImuIncrements
     gnss: GnssFixes
     estimate: Estimate
+    aids: tuple[AidRow, ...] = ()
 
 
 def split(imu: ImuIncrements, gap_s: float) -> list[ImuIncrements]:
@@ -75,8 +80,13 @@ def estimate_segments(
     may_roll: bool,
     may_stop: bool,
     latency_s: float = 0.0,
+    aids: Aids | None = None,
+    aid_settings: AidSettings | None = None,
+    ambiguous_below: float = 10.0,
 ) -> tuple[Segment, ...]:
-    """Estimate every segment that is long enough; noise and latency are those of the longest.
+    """Estimate every segment that is long enough.
+
+    Noise, latency and choice of aids are those of the longest.
 
     Raises
     ------
@@ -109,5 +119,12 @@ def estimate_segments(
             latency_s=latency_s if first is None else first.latency_s,
             lag_s=0.0 if first is None else first.lag_s,
         )
-        found[i] = Segment(part, fixes, done)
+        rows: tuple[AidRow, ...] = ()
+        if aids is not None:
+            here = of_span(aids, float(part.time_s[0]), float(part.time_s[-1]))
+            here = here if first is None else used_alone(here, found[order[0]].aids)
+            done, rows = aided(
+                done, here, aid_settings or AidSettings(), ambiguous_below=ambiguous_below, fit=first is None
+            )
+        found[i] = Segment(part, fixes, done, rows)
     return tuple(found[i] for i in range(len(long)))

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from groundstation.base.toml_settings import check_ranges, number
+from groundstation.systems.trajectory.aid_settings import AidSettings
 from groundstation.systems.trajectory.input_settings import InputSettings
 from groundstation.systems.trajectory.mounting_settings import MountingSettings
 
@@ -16,6 +17,7 @@ class TrajectorySettings:
 
     input: InputSettings = field(default_factory=InputSettings)
     mounting: MountingSettings = field(default_factory=MountingSettings)
+    aids: AidSettings = field(default_factory=AidSettings)
     moving_mps: float = number(0.5, 0.05, 10.0)  # GNSS shows more where it moves
     moving_min_s: float = number(60.0, 1.0, 3600.0)  # of motion: less is refused
     sample_rate_min_hz: float = number(25.0, 1.0, 1000.0)  # point samples below it in motion are refused

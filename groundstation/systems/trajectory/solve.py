@@ -11,6 +11,7 @@ from groundstation.base.findings import Finding
 from groundstation.results.gates import Gate, judged_gate
 from groundstation.systems.known import Known
 from groundstation.systems.trajectory import checks, figures, judge, tell
+from groundstation.systems.trajectory.aids_input import Aids, aids_of
 from groundstation.systems.trajectory.answer import BestTrajectory, TrajectoryState, UnitMounting
 from groundstation.systems.trajectory.checks_answer import HeadingHypothesis, InnovationRow
 from groundstation.systems.trajectory.estimate import Estimate
@@ -70,8 +71,25 @@ def solve(
         may_roll=vehicle == "rolls",
         may_stop=vehicle in ("rolls", "walks"),
         latency_s=lag_s if np.isfinite(lag_s) and abs(lag_s) > COARSE_LAG_S else 0.0,
+        aids=aids_beside(flight, known, gathered, mounting, settings),
+        aid_settings=settings.aids,
+        ambiguous_below=settings.ambiguous_below,
     )
     return _answered(flight, gathered, mounting, segments, settings, vehicle or "")
+
+
+def aids_beside(
+    flight: "Flight", known: Known, gathered: Gathered, mounting: Mounting, settings: TrajectorySettings
+) -> Aids:
+    """Return the aids of a flight beside GNSS."""
+    return aids_of(
+        flight,
+        known,
+        gathered.gnss,
+        settings.aids,
+        rolls=known.phases.vehicle.kind == "rolls",
+        is_mounted=mounting.source not in ("case", "refused"),
+    )
 
 
 def mounting_of(flight: "Flight", known: Known, gathered: Gathered, settings: TrajectorySettings) -> Mounting:
@@ -135,7 +153,8 @@ def _answered(
     vehicle: str,
 ) -> tuple[BestTrajectory, tuple[Finding, ...], Solved]:
     estimates = tuple(one.estimate for one in segments)
-    main = max(estimates, key=lambda one: len(one.result.plan.epoch_s))
+    longest = max(segments, key=lambda one: len(one.estimate.result.plan.epoch_s))
+    main = longest.estimate
     innovations = checks.innovations_of(main)
     _fits(innovations, main, settings)
     outages = _joined([replay(one) for one in estimates])
@@ -183,9 +202,10 @@ def _answered(
         innovations=innovations,
         held_out=checks.held_out(main),
         own_track=own,
-        outages=judge.outage_rows(outages, factors.position),
+        outages=judge.outage_rows(outages, factors.position, factors.height),
         outage_truth="RTK" if gathered.gnss_facts.precise_share > 0.9 else "undisturbed solution",
         hypotheses=hypotheses,
+        aids=longest.aids,
         onboard=None if compared is None else compared.errors,
         separation=separation,
         settings=asdict(settings),
@@ -263,7 +283,7 @@ def _gates(
             (None, settings.heading_sigma_max_deg), "heading_sigma", "sigma of the heading", sigma_deg, unit="deg"
         )
     )
-    for name in ("position", "velocity", "tilt", "heading"):
+    for name in ("position", "height", "velocity", "tilt", "heading"):
         bound = (None, settings.raised_doubt)
         gates.append(judged_gate(bound, f"raised_{name}", f"factor on sigmas of {name}", getattr(factors, name)))
     return tuple(gates)
@@ -335,7 +355,17 @@ def _onboard(smoothed: TrackOfStates, flight: "Flight") -> ComparedFilter | None
 
 def _findings(gathered: Gathered, answer: BestTrajectory) -> tuple[Finding, ...]:
     """Return what the input showed."""
-    return tuple(
-        Finding("warn" if note.is_doubt else "info", f"trajectory.{note.code}", note.text, gathered.imu_facts.topic)
-        for note in gathered.notes
-    ) + tuple(Finding("warn", f"trajectory.{answer.state}", reason, answer.imu) for reason in answer.reasons[:1])
+    return (
+        tuple(
+            Finding("warn" if note.is_doubt else "info", f"trajectory.{note.code}", note.text, gathered.imu_facts.topic)
+            for note in gathered.notes
+        )
+        + tuple(
+            Finding(
+                "warn", f"trajectory.{row.name.replace(' ', '_')}", f"{row.topic} does not aid: {row.reason}", row.topic
+            )
+            for row in answer.aids
+            if row.is_wrong
+        )
+        + tuple(Finding("warn", f"trajectory.{answer.state}", reason, answer.imu) for reason in answer.reasons[:1])
+    )

@@ -20,6 +20,7 @@ SLOW      3       slow error of GNSS position, north, east, down, m
 FAST      3       fast error of GNSS position, north, east, down, m
 MNT       2       direction of travel of what rolls in the axes of the unit: yaw and pitch, rad
 BARO      1       offset of the barometric height, m
+WHL       1       scale factor of the speed of the wheels, no unit
 ========  ======  =====================================================================================
 
 The attitude is that of the accelerometer's axes, made square: a rotation of both triads against the case is seen by
@@ -38,16 +39,17 @@ FloatArray = NDArray[np.float64]
 Marks = NDArray[np.int8]
 
 POS, VEL, ATT, BG, BA, SG, MG, SA, MA = 0, 3, 6, 9, 12, 15, 18, 24, 27
-LEV, LAT, LAG, SLOW, FAST, MNT, BARO = 30, 33, 34, 35, 38, 41, 43
-STATES = 44
+LEV, LAT, LAG, SLOW, FAST, MNT, BARO, WHL = 30, 33, 34, 35, 38, 41, 43, 44
+STATES = 45
 NAVIGATION = 9  # the first states: position, velocity, attitude
 KEPT_ROWS = 15  # rows of the covariance that the smoother needs: navigation and biases
 MISALIGNED = ((0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1))  # axis that reads, axis that turned
 NOT_SQUARE = ((0, 1), (0, 2), (1, 2))
 
 # Kinds of measurements.
-POSITION, VELOCITY, STILL, NO_RATE, NO_SLIP, HEIGHT, HEADING = range(7)
-KINDS = 7
+POSITION, VELOCITY, STILL, NO_RATE, NO_SLIP, HEIGHT, HEADING, WHEEL = range(8)
+KINDS = 8
+AIDS = HEIGHT  # this kind and those behind it open no state where they are rejected: it is they that are wrong
 WIDTH = 10  # most states that one scalar measurement sees
 
 
@@ -91,7 +93,7 @@ class Seen(NamedTuple):
 
     kind: Int64Array  # (m,)
     back_s: FloatArray  # (m,) so much before the epoch they are valid
-    value: FloatArray  # (m, 3): latitude and longitude in rad and height in m; m/s; rad/s; m; rad
+    value: FloatArray  # (m, 3): latitude and longitude in rad and height in m; m/s; rad/s; m; rad; m/s
     variance: FloatArray  # (m, 3)
     rate: FloatArray  # (m, 3) angular rate and specific force in the unit's axes, means about that time
     force: FloatArray  # (m, 3)

@@ -28,6 +28,7 @@ from groundstation.systems.trajectory.states import (
     SG,
     SLOW,
     VELOCITY,
+    WHL,
 )
 
 OBSERVABLE = 0.6  # of the sigma at the start: what keeps more of it was not seen
@@ -44,6 +45,9 @@ NOISES = (
     ("fast_scale", "fast error of GNSS position (10 s), beside the stated sigma", ""),
     ("velocity_scale", "error of GNSS velocity, beside the stated sigma", ""),
     ("velocity_down_scale", "error of its vertical velocity, beside the horizontal one", ""),
+    ("baro_m", "error of the barometric height, in a second", "m"),
+    ("baro_walk_m_rth", "walk of its offset", "m/sqrt(h)"),
+    ("wheel_mps", "error of the speed of the wheels", "m/s"),
     ("jitter_s", "jitter of the stamps of GNSS", "s"),
     ("slip_mps", "sideways motion of what rolls", "m/s"),
     ("slip_walk_deg_rts", "walk of its direction of travel", "deg/sqrt(s)"),
@@ -53,7 +57,9 @@ NOISES = (
 def noise_rows(estimate: Estimate) -> tuple[NoiseRow, ...]:
     """Return the numbers of the model: prior, fitted, whether at a bound."""
     prior = Model()
-    names = [one for one in NOISES if not one[0].startswith("slip") or estimate.problem.has_slip]
+    problem = estimate.problem
+    lacking = {"slip": not problem.has_slip, "baro": not problem.has_baro, "wheel": not problem.has_wheels}
+    names = [one for one in NOISES if not lacking.get(one[0].split("_")[0], False)]
     return tuple(
         NoiseRow(
             words,
@@ -94,6 +100,7 @@ def parameter_rows(estimate: Estimate) -> tuple[TrajectoryParameter, ...]:
         put(LEV + i, name, "lever arm", "m", 1.0)
     put(LAT, LATENCY, "latency", "s", 1.0, estimate.problem.latency_s)
     put(LAG, VELOCITY_LAG, "latency", "s", 1.0, estimate.problem.lag_s)
+    put(WHL, "scale of the speed of the wheels", "wheels", "%", 0.01)
     put(MNT, "travel in the unit, yaw", "mounting", "deg", DEG)
     put(MNT + 1, "travel in the unit, pitch", "mounting", "deg", DEG)
     return tuple(rows)

@@ -43,6 +43,7 @@ SIZES = np.concatenate(
         np.full(6, 3.0),
         np.full(2, 0.1),
         [5.0],
+        [0.02],
     ]
 )
 

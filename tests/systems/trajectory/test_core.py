@@ -32,6 +32,8 @@ from groundstation.systems.trajectory.states import (
     STATES,
     STILL,
     VELOCITY,
+    WHEEL,
+    WHL,
     Seen,
 )
 from tests.systems.trajectory.core_cases import (
@@ -54,7 +56,7 @@ ROW = 3e-5
 # Biases turn and push the antenna between the fix and the epoch: left out, since that is 10 ms at most but for the
 # latency that is still to be found.
 LEFT_OUT = [*range(BG, BG + 3), *range(BA, BA + 3)]
-SCALARS = {POSITION: 3, VELOCITY: 3, STILL: 3, NO_RATE: 3, NO_SLIP: 2, HEIGHT: 1, HEADING: 1}
+SCALARS = {POSITION: 3, VELOCITY: 3, STILL: 3, NO_RATE: 3, NO_SLIP: 2, HEIGHT: 1, HEADING: 1, WHEEL: 1}
 
 
 def value_of(rng: np.random.Generator) -> FloatArray:
@@ -65,7 +67,7 @@ def value_of(rng: np.random.Generator) -> FloatArray:
     value[LAT], value[LAG] = 0.05, 0.02
     value[SLOW:MNT] = rng.standard_normal(6)
     value[MNT:BARO] = 0.05, -0.03
-    value[BARO] = 2.0
+    value[BARO], value[WHL] = 2.0, 0.01
     return value
 
 
@@ -81,7 +83,7 @@ def measured(kind: int, start: Start) -> FloatArray:
     elif kind == NO_SLIP:
         found[:2] = 0.0
     else:
-        found[0] = start.nav[2] if kind == HEIGHT else 3.0
+        found[0] = {HEIGHT: start.nav[2], WHEEL: float(np.linalg.norm(start.nav[3:6]))}.get(kind, 3.0)
     return found
 
 
@@ -154,7 +156,7 @@ def short_problem(family: Family, epochs: int, *, with_line: bool = False) -> tu
         np.tile([0.02, -0.05, 0.1], (len(kinds), 1)),
         np.tile([0.3, 0.2, -9.8], (len(kinds), 1)),
     )
-    sigmas = StartSigmas().variances(NOISE, Model(), has_latency=True, has_slip=True, has_baro=True)
+    sigmas = StartSigmas().variances(NOISE, Model(), has_latency=True, has_slip=True, has_baro=True, has_wheels=True)
     sigmas[:NAVIGATION] = np.repeat([25.0, 1.0, (5.0 * DEG) ** 2], 3)
     mix = np.eye(STATES) + 0.1 * rng.standard_normal((STATES, STATES))
     p = np.sqrt(sigmas)[:, None] * (mix @ mix.T) * np.sqrt(sigmas)

@@ -1,0 +1,28 @@
+"""Aids of a trajectory beside GNSS: which were used, and why another was not."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+AidName = Literal["barometer", "wheel speed", "magnetic heading"]
+
+
+@dataclass(frozen=True)
+class AidRow:
+    """Aid that a log has, or that the aircraft file states.
+
+    Parameters
+    ----------
+    name : str
+    topic : str
+    is_used : bool
+    reason : str
+        Why it is not used; of one that is: with what.
+    is_wrong : bool
+        Its readings cannot be right.
+    """
+
+    name: AidName
+    topic: str
+    is_used: bool
+    reason: str
+    is_wrong: bool = False
