@@ -69,9 +69,7 @@ class Fit:
 Scores = Callable[[Callable[[FloatArray], Model], FloatArray], Scored]
 
 
-def fit_model(
-    prior: Model, scored: Scores, numbers: tuple[Number, ...] = NUMBERS, begin: Model | None = None
-) -> Fit:
+def fit_model(prior: Model, scored: Scores, numbers: tuple[Number, ...] = NUMBERS, begin: Model | None = None) -> Fit:
     """Return the model of largest penalised likelihood near ``prior``.
 
     Parameters
@@ -95,9 +93,7 @@ def fit_model(
         count += 1
         found = scored(model_at, at)
         value = found.value if np.isfinite(found.value) else -1e300
-        return Scored(
-            float(value - 0.5 * np.sum((at / spread) ** 2)), found.gradient - at / spread**2, found.expected
-        )
+        return Scored(float(value - 0.5 * np.sum((at / spread) ** 2)), found.gradient - at / spread**2, found.expected)
 
     logs = np.zeros(len(numbers))
     if begin is not None:
@@ -127,12 +123,18 @@ def fit_model(
 
 
 def _bound(at: Scored, spread: FloatArray) -> FloatArray:
-    """Return a bound for the inverse of the information, shape (n, n): steps by it never go too far."""
+    """Return a bound for the inverse of the information, shape (n, n).
+
+    Steps by it never go too far.
+    """
     return np.diag(1.0 / (2.0 * at.expected + spread**-2.0 + np.maximum(at.gradient, 0.0)))
 
 
 def _learned(inverse: FloatArray, step: FloatArray, fell: FloatArray) -> FloatArray:
-    """Return the inverse of the information, learned from what the derivatives fell by over a step (BFGS)."""
+    """Return the inverse of the information after a step (BFGS).
+
+    It is learned from what the derivatives fell by.
+    """
     curved = float(step @ fell)
     if curved <= 1e-6:
         return inverse

@@ -1,4 +1,4 @@
-"""Score of a model: derivatives of the log-likelihood of a log by the numbers of its model.
+"""Score of a model: derivatives of the log-likelihood by its numbers.
 
 The adjoint ``a`` and ``A`` of the smoother are that of the covariance too: what is added to it at any place changes the
 log-likelihood by the trace of (a a' - A) / 2 times it. One filter and one way back give every derivative.
@@ -59,7 +59,7 @@ def run_score(
     by_scalar: FloatArray,
     by_noise: FloatArray,
 ) -> None:
-    """Go back over the epochs before ``end`` and fill the adjoints of what adds to the covariance.
+    """Go back over the epochs before ``end`` and fill the adjoints of all noise.
 
     Parameters
     ----------
@@ -164,12 +164,14 @@ def score_of(
 def solved_with(
     samples: Samples, plan: Plan, gate: Gate, known: Linear, end: int, of: Variances
 ) -> tuple[float, Solved]:
-    """Return the log-likelihood of the epochs before ``end``, and the gains and innovations of the filter."""
+    """Return the log-likelihood of the epochs before ``end``, with gains and innovations."""
     count = of.seen.size
     plan = replace(plan, seen=plan.seen._replace(variance=of.seen))
     solved = nothing_kept()._replace(
         K=np.empty((count, STATES)), y=np.empty(count), S=np.ones(count), mark=np.zeros(count, dtype=np.int8)
     )
     now, room = of.start.now(), make_room(of.start.prior)
-    value = filter_epochs(samples, plan, of.noise, gate, OWN_ESTIMATE, (0, end), now, room, known, solved, carries=False)
+    value = filter_epochs(
+        samples, plan, of.noise, gate, OWN_ESTIMATE, (0, end), now, room, known, solved, carries=False
+    )
     return value, solved
