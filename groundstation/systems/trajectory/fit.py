@@ -123,12 +123,18 @@ def fit_model(prior: Model, scored: Scores, numbers: tuple[Number, ...] = NUMBER
 
 
 def _bound(at: Scored, spread: FloatArray) -> FloatArray:
-    """Return a bound for the inverse of the information, shape (n, n): steps by it never go too far."""
+    """Return a bound for the inverse of the information, shape (n, n).
+
+    Steps by it never go too far.
+    """
     return np.diag(1.0 / (2.0 * at.expected + spread**-2.0 + np.maximum(at.gradient, 0.0)))
 
 
 def _learned(inverse: FloatArray, step: FloatArray, fell: FloatArray) -> FloatArray:
-    """Return the inverse of the information, learned from what the derivatives fell by over a step (BFGS)."""
+    """Return the inverse of the information after a step (BFGS).
+
+    It is learned from what the derivatives fell by.
+    """
     curved = float(step @ fell)
     if curved <= 1e-6:
         return inverse

@@ -69,17 +69,14 @@ def carry(e: int, schedule: Schedule, imu: Imu, noise: Noise, now: Now, room: Ro
     for i in range(3):
         turn[i] = 0.0
         spent[e, i] = 0.0
-    spent[e, 3] = 0.0
     for k in range(schedule.first[e], schedule.first[e + 1]):
         mechanise(imu.interval_s, imu.angle, imu.velocity, k, value, nav, now.before, room.C, step)
         grow_transition(room.C, step, room.grown)
         for i in range(3):
             turn[i] += step[12 + i]
-        a, b, c = step[3], step[4], step[5]
         spent[e, 0] += imu.interval_s[k]
-        spent[e, 1] += (a * a + b * b + c * c) / imu.interval_s[k]
-        spent[e, 2] += imu.angle_variance[k]
-        spent[e, 3] += imu.velocity_variance[k]
+        spent[e, 1] += imu.angle_variance[k]
+        spent[e, 2] += imu.velocity_variance[k]
         slot = schedule.slot[k]
         if slot >= 0:
             for i in range(10):
@@ -115,17 +112,17 @@ def predict(e: int, noise: Noise, pattern: Pattern, now: Now, room: Room, linear
     predict_states(room.states, pattern, F, e, room.x, room.w)
     total = spent[e, 0]
     for i in range(3):
-        q = density[1] * total + spent[e, 3]
+        q = density[1] * total + spent[e, 2]
         p[i, i] += q * total * total / 3.0
         p[i, 3 + i] += 0.5 * q * total
         p[3 + i, i] = p[i, 3 + i]
         p[3 + i, 3 + i] += q
-        p[6 + i, 6 + i] += density[0] * total + density[4] * spent[e, 1] + spent[e, 2]
+        p[6 + i, 6 + i] += density[0] * total + spent[e, 1]
         p[BG + i, BG + i] += density[2] * total
         p[BA + i, BA + i] += density[3] * total
     for i in range(2):
         if p[MNT + i, MNT + i] > 0.0:
-            p[MNT + i, MNT + i] += density[5] * total
+            p[MNT + i, MNT + i] += density[4] * total
     for i in range(6):
         at, decay = SLOW + i, F[e, BLOCK + i]
         p[at, at] += noise.variance[i] * (1.0 - decay * decay)

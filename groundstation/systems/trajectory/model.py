@@ -47,8 +47,6 @@ class Model:
         Angle and velocity random walk, deg and m/s in the square root of an hour.
     gyro_walk_dps_rth, accel_walk_mg_rth : float
         Random walk of the biases: deg/s, and mg, in the square root of an hour.
-    rate_noise : float
-        Noise that grows with the rate: rad in the square root of (rad2/s).
     position_scale, velocity_scale : float
         White error of GNSS beside the sigma that the receiver states.
     velocity_down_scale : float
@@ -80,7 +78,6 @@ class Model:
     accel_noise_mps_rth: float = 0.12
     gyro_walk_dps_rth: float = 0.05
     accel_walk_mg_rth: float = 3.0
-    rate_noise: float = 0.0
     position_scale: float = 0.5
     velocity_scale: float = 1.0
     velocity_down_scale: float = 1.0
@@ -112,7 +109,6 @@ class Model:
                     (self.accel_noise_mps_rth / root) ** 2,
                     (self.gyro_walk_dps_rth * DEG / root) ** 2,
                     (self.accel_walk_mg_rth * 1e-3 * MPS2_PER_G / root) ** 2,
-                    self.rate_noise**2,
                     (self.slip_walk_deg_rts * DEG) ** 2,
                 ]
             ),

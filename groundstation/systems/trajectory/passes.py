@@ -100,7 +100,7 @@ def linear_room(plan: Plan) -> Linear:
         np.empty((int(plan.schedule.slot.max()) + 1, 10)),
         np.empty((epochs, STATES)),
         np.empty((epochs, ENTRIES)),
-        np.empty((epochs, 4)),
+        np.empty((epochs, 3)),
         np.empty((epochs, STATES)),
         np.empty(scalars),
         np.zeros((scalars, WIDTH), dtype=np.int64),

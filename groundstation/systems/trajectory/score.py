@@ -1,4 +1,4 @@
-"""Score of a model: derivatives of the log-likelihood of a log by the numbers of its model.
+"""Score of a model: derivatives of the log-likelihood by its numbers.
 
 The adjoint ``a`` and ``A`` of the smoother are that of the covariance too: what is added to it at any place changes the
 log-likelihood by the trace of (a a' - A) / 2 times it. One filter and one way back give every derivative.
@@ -39,7 +39,7 @@ from groundstation.systems.trajectory.states import (
     Solved,
 )
 
-DENSITIES = 6
+DENSITIES = 5
 VARIANCES = 7
 STEP = 1e-3  # of a logarithm, for derivatives of the variances of a model
 
@@ -59,7 +59,7 @@ def run_score(
     by_scalar: FloatArray,
     by_noise: FloatArray,
 ) -> None:
-    """Go back over the epochs before ``end`` and fill the adjoints of what adds to the covariance.
+    """Go back over the epochs before ``end`` and fill the adjoints of all noise.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def run_score(
                 if solved.mark[at] == 1:
                     back_over_scalar(at, linear, solved, a, A, u, own)
                     by_scalar[0, at], by_scalar[1, at] = own[0], own[1]
-        time_s, squared = linear.spent[e, 0], linear.spent[e, 1]
+        time_s = linear.spent[e, 0]
         for side in range(2):
             into = by_noise[side]
             for j in range(STATES):
@@ -90,9 +90,8 @@ def run_score(
                 into[1] += time_s * (u[3 + i] + time_s * (moved + time_s * u[i] / 3.0))
                 into[2] += u[BG + i] * time_s
                 into[3] += u[BA + i] * time_s
-                into[4] += u[6 + i] * squared
             for i in range(2):
-                into[5] += u[MNT + i] * time_s
+                into[4] += u[MNT + i] * time_s
             for i in range(VARIANCES):
                 decay = linear.F[e, BLOCK + i]
                 into[DENSITIES + i] += u[BARO if i == 6 else SLOW + i] * (1.0 - decay * decay)
@@ -164,7 +163,7 @@ def score_of(
 def solved_with(
     samples: Samples, plan: Plan, gate: Gate, known: Linear, end: int, of: Variances
 ) -> tuple[float, Solved]:
-    """Return the log-likelihood of the epochs before ``end``, and the gains and innovations of the filter."""
+    """Return the log-likelihood of the epochs before ``end``, with gains and innovations."""
     count = of.seen.size
     plan = replace(plan, seen=plan.seen._replace(variance=of.seen))
     solved = nothing_kept()._replace(

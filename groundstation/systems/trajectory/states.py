@@ -105,7 +105,7 @@ class Noise(NamedTuple):
     Spectral densities of the unit's noise, and the Gauss-Markov processes.
     """
 
-    density: FloatArray  # (6,) gyro rad2/s, accelerometer m2/s3, biases rad2/s3 and m2/s5, rate, slip angle rad2/s
+    density: FloatArray  # (5,) gyro rad2/s, accelerometer m2/s3, biases rad2/s3 and m2/s5, slip angle rad2/s
     time_s: FloatArray  # (3,) correlation times: slow, fast, barometer
     variance: FloatArray  # (7,) stationary variances: slow and fast north, east, down, m2; barometer
 
@@ -160,7 +160,7 @@ class Linear(NamedTuple):
     nav: FloatArray  # (slots, 10) estimate after the samples that are kept, before the measurements of their epoch
     value: FloatArray  # (e or 0, STATES) values at the end of each epoch, before its measurements
     F: FloatArray  # (e, entries)
-    spent: FloatArray  # (e, 4) time, squared rate times time, variances of gaps: angle, velocity
+    spent: FloatArray  # (e, 3) time, variances of gaps: angle, velocity
     closed: FloatArray  # (e, STATES) by which the estimate was moved behind the measurements
     z: FloatArray  # (s,) measured minus predicted of each scalar
     columns: Int64Array  # (s, WIDTH)

@@ -169,15 +169,15 @@ def short_problem(family: Family, epochs: int, *, with_line: bool = False) -> tu
 def process_noise(done: Pass, epoch: int) -> FloatArray:
     """Covariance that an epoch adds, from the densities of the model."""
     Q = np.zeros((STATES, STATES))
-    total, turned, of_angle, of_velocity = done.linear.spent[epoch]
+    total, of_angle, of_velocity = done.linear.spent[epoch]
     q = NOISE.density[1] * total + of_velocity
     for axis in range(3):
         Q[axis, axis], Q[axis, 3 + axis], Q[3 + axis, axis] = q * total**2 / 3.0, q * total / 2.0, q * total / 2.0
         Q[3 + axis, 3 + axis] = q
-        Q[6 + axis, 6 + axis] = NOISE.density[0] * total + NOISE.density[4] * turned + of_angle
+        Q[6 + axis, 6 + axis] = NOISE.density[0] * total + of_angle
         Q[BG + axis, BG + axis] = NOISE.density[2] * total
         Q[BA + axis, BA + axis] = NOISE.density[3] * total
-    Q[range(MNT, BARO), range(MNT, BARO)] = NOISE.density[5] * total
+    Q[range(MNT, BARO), range(MNT, BARO)] = NOISE.density[4] * total
     fade = np.diag(transition(done.linear, epoch))
     for place, state in enumerate((*range(SLOW, MNT), BARO)):
         Q[state, state] = NOISE.variance[place] * (1.0 - fade[state] ** 2)
