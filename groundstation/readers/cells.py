@@ -163,7 +163,10 @@ def roots(read: TableCells) -> TableCells:
 
 
 def _cast(text: Any, target: Any, pattern: str, is_sound: bool = True) -> tuple[Any, BoolArray]:
-    """Cast a column; where that fails, or it is not sound, cast what matches ``pattern`` and mark the rest."""
+    """Cast a column; where that fails, cast what matches ``pattern`` and mark the rest.
+
+    A column that is not sound is taken as one that fails.
+    """
     options = pc.CastOptions(target_type=target, allow_decimal_truncate=True)
     if is_sound:
         with suppress(pa.ArrowException):

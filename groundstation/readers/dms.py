@@ -1,4 +1,4 @@
-"""Degrees, minutes and seconds in the cells of a column, in one compiled pass over their bytes.
+"""Degrees, minutes and seconds in the cells of a column, by one compiled pass.
 
 What is written in an unusual way is left to :func:`groundstation.readers.cells.degrees`; values are equal to the bit.
 """
@@ -22,7 +22,10 @@ COMPILED_ROWS = 5_000  # below them a compiler takes longer than it saves
 
 
 def is_quick(missing: Sequence[str], rows: int) -> bool:
-    """Tell whether :func:`degrees` reads a column; a text that means no value must not look like an angle."""
+    """Tell whether :func:`degrees` reads a column.
+
+    No text that means no value may look like an angle.
+    """
     return rows >= COMPILED_ROWS and all(
         number_of(text) is not None or not any(map(str.isdigit, text)) for text in missing
     )
@@ -90,7 +93,7 @@ def _behind_blanks(data: Any, at: int, end: int) -> int:
 
 @inlined
 def _behind_sign(data: Any, at: int, end: int, part: int) -> int:
-    """Return the place behind the sign of degrees, minutes or seconds (0, 1, 2), if one stands there."""
+    """Return the place behind the sign of degrees, minutes or seconds (parts 0, 1, 2)."""
     if at >= end:
         return at
     one = data[at]

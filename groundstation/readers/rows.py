@@ -18,7 +18,8 @@ from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.readers.dialect import Dialect, normal_form
 from groundstation.readers.losses import Losses
-from groundstation.readers.source import RowShape, Source
+from groundstation.readers.row_shapes import RowShape, shape_of
+from groundstation.readers.source import Source
 
 BLOCK_BYTES = 4 << 20
 MAX_LINE_BYTES = 8 << 20
@@ -44,9 +45,13 @@ def restore_delimiters(text: str, delimiter: str) -> str:
 
 
 class RowScanner:
-    """Iterator over the blocks of sound rows of a source; counts losses into ``losses``."""
+    """Iterator over the blocks of sound rows of a source; counts losses into ``losses``.
 
-    def __init__(self, source: Source, dialect: Dialect, losses: Losses) -> None:
+    ``is_compiled``: cells are counted by a compiled loop where there are many rows.
+    """
+
+    def __init__(self, source: Source, dialect: Dialect, losses: Losses, *, is_compiled: bool = False) -> None:
+        self._is_compiled = is_compiled
         self._source, self._dialect, self._losses = source, dialect, losses
         self._next_line = dialect.first_line
         # Lines left out behind a header may lie behind the end of its rows.
@@ -122,7 +127,7 @@ class RowScanner:
         if b'"' in text:
             text, shape = without_quotes(text, self._dialect.delimiter), None
         array = np.frombuffer(text, dtype=np.uint8)
-        shape = shape or _shape_of(array, self._dialect.delimiter)
+        shape = shape or shape_of(text, self._dialect.delimiter, is_compiled=self._is_compiled)
         ends, cells = shape.ends, shape.cells
         starts = np.concatenate(([0], ends[:-1] + 1))
         numbers = self._next_line + np.arange(len(ends), dtype=np.int64)
@@ -167,12 +172,6 @@ class RowScanner:
         few = cells < expected
         self._losses.add("dropped_rows", f"rows with fewer cells than the header's {expected}", numbers[few])
         self._losses.add("dropped_rows", f"rows with more cells than the header's {expected}", numbers[~few])
-
-
-def _shape_of(text: NDArray[np.uint8], delimiter: str) -> RowShape:
-    ends = np.flatnonzero(text == _LF)
-    delimiters = np.flatnonzero(text == ord(delimiter))
-    return RowShape(ends, np.diff(np.searchsorted(delimiters, ends), prepend=0) + 1)
 
 
 def without_quotes(text: bytes, delimiter: str) -> bytes:

@@ -12,18 +12,11 @@ from typing import Any, BinaryIO, Protocol, runtime_checkable
 
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.reading import open_to_read
-from groundstation.base.records import Damage, Int64Array, Item
+from groundstation.base.records import Damage, Item
 from groundstation.readers.compressed import Expanded, FileWindow, compression_of, expand, head_of
+from groundstation.readers.row_shapes import RowShape
 
 HEAD_BYTES = 1 << 20  # a header row of 10 000 columns takes about 300 kB
-
-
-@dataclass(frozen=True)
-class RowShape:
-    """Shape of rows: the byte of each line feed, and the number of cells before it."""
-
-    ends: Int64Array
-    cells: Int64Array
 
 
 @dataclass(frozen=True)
@@ -87,11 +80,11 @@ class Source:
 
     @property
     def lines(self) -> "Source":
-        """Source of the lines that :meth:`rows` turns into rows; its bytes stand at the same places."""
+        """Source of the lines that :meth:`rows` turns into rows, at the same bytes."""
         return self
 
     def rows(self, lines: bytes) -> tuple[bytes, RowShape | None]:
-        """Return whole lines as rows with delimiters between the cells, and their shape where it is known."""
+        """Return whole lines as rows with delimiters, and their shape where it is known."""
         return lines, None
 
     def damages(self) -> tuple[Damage, ...]:

@@ -17,7 +17,8 @@ from groundstation.base.compile import in_place
 from groundstation.base.records import BoolArray
 from groundstation.readers.compressed import FileWindow, unnamed_file
 from groundstation.readers.positioned import Positioned
-from groundstation.readers.source import HEAD_BYTES, MadeSource, RowShape, Source
+from groundstation.readers.row_shapes import COMPILED_BYTES, RowShape, shape_of
+from groundstation.readers.source import HEAD_BYTES, MadeSource, Source
 
 if TYPE_CHECKING:
     from _typeshed import WriteableBuffer
@@ -26,7 +27,8 @@ _BLANK, _TAB, _LF, _CR = 32, 9, 10, 13
 _NUMERIC = np.frombuffer(b"0123456789+-.", np.uint8)
 _BEFORE_BYTES = 1 << 16  # looked at before a place for the beginning of its line
 _PIECE_BYTES = 1 << 20
-_COMPILED_BYTES = 1 << 18  # below it numpy takes a moment, and a compiler some seconds
+_LINE_BYTES = 16  # of a line, at least, in most tables
+_MOST_TABS = 1 << 26  # in a piece
 
 
 @dataclass(frozen=True)
@@ -56,9 +58,7 @@ class SpacedSource(MadeSource):
         """The first bytes, with tabs."""
         head = self.whole.head
         is_whole = len(head) < HEAD_BYTES
-        return tabbed(np.frombuffer(head + (b"\n" if is_whole else b""), np.uint8), self.cells, self.joined)[
-            : len(head)
-        ]
+        return tabbed(head + (b"\n" if is_whole else b""), self.cells, self.joined)[: len(head)]
 
     @property
     def lines(self) -> Source:
@@ -66,15 +66,10 @@ class SpacedSource(MadeSource):
         return self.whole
 
     def rows(self, lines: bytes) -> tuple[bytes, RowShape | None]:
-        """Return lines with a tab before each cell, and no other blanks where there are many lines."""
-        text = np.frombuffer(lines, np.uint8)
-        if len(lines) < _COMPILED_BYTES or b'"' in lines:  # a cell in quotes keeps its blanks
-            return tabbed(text, self.cells, self.joined), None
-        is_joined = np.zeros(max(self.joined, default=-1) + 1, np.bool_)
-        is_joined[list(self.joined)] = True
-        tight, shape = np.empty(len(text), np.uint8), np.empty((2, np.count_nonzero(text == _LF)), np.int64)
-        size = tighten(text, tight, shape, self.cells, is_joined)
-        return tight[:size].tobytes(), RowShape(shape[0], shape[1])
+        """Return lines with a tab before each cell; many lines without other blanks."""
+        if len(lines) < COMPILED_BYTES or b'"' in lines:  # a cell in quotes keeps its blanks
+            return tabbed(lines, self.cells, self.joined), None
+        return _tightened(lines, self.cells, self.joined, keeps_blanks=False)
 
     def open(self) -> BinaryIO:
         """Open for reading bytes with tabs."""
@@ -120,26 +115,42 @@ class _Tabs(Positioned):
         if more:
             end = max(data.rfind(b"\n"), data.rfind(b"\r")) + 1
             data = data[:end] if end > self._at - start else data + more  # else a line longer than a piece
-        array = np.frombuffer(data if data[-1:] in (b"\n", b"\r") else data + b"\n", np.uint8)
-        self._from, self._ready = start, tabbed(array, self._cells, self._joined)[: len(data)]
+        ended = data if data[-1:] in (b"\n", b"\r") else data + b"\n"
+        self._from, self._ready = start, tabbed(ended, self._cells, self._joined)[: len(data)]
 
 
-def tabbed(text: NDArray[np.uint8], cells: int = 0, joined: Sequence[int] = ()) -> bytes:
+def tabbed(lines: bytes, cells: int = 0, joined: Sequence[int] = ()) -> bytes:
     """Return lines with a tab for the last blank before each cell but the first.
 
-    Parameters
-    ----------
-    text : ndarray of uint8, shape (n,)
-        Lines, the last one ended.
-    cells, joined
-        As those of :class:`SpacedSource`.
+    The last line is ended. ``cells`` and ``joined`` are those of :class:`SpacedSource`.
 
     Examples
     --------
-    >>> line = np.frombuffer(b"  7  47 00 12.5   3 \\n", np.uint8)
+    >>> line = b"  7  47 00 12.5   3 \\n"
     >>> tabbed(line), tabbed(line, 5, (1, 2))
     (b'  7 \\t47\\t00\\t12.5  \\t3 \\n', b'  7 \\t47 00 12.5  \\t3 \\n')
     """
+    if len(lines) < COMPILED_BYTES:
+        return _tabbed(np.frombuffer(lines, np.uint8), cells, joined)
+    return _tightened(lines, cells, joined, keeps_blanks=True)[0]
+
+
+def _tightened(lines: bytes, cells: int, joined: Sequence[int], *, keeps_blanks: bool) -> tuple[bytes, RowShape]:
+    text = np.frombuffer(lines, np.uint8)
+    is_joined = np.zeros(max(joined, default=-1) + 1, np.bool_)
+    is_joined[list(joined)] = True
+    tight = np.empty(len(text), np.uint8)
+    shape = np.empty((2, len(text) // _LINE_BYTES + 1), np.int64)
+    size = tighten(text, tight, shape, keeps_blanks, cells, is_joined)
+    if size < 0:  # many short lines
+        shape = np.empty((2, np.count_nonzero(text == _LF) + 1), np.int64)
+        size = tighten(text, tight, shape, keeps_blanks, cells, is_joined)
+    count = int(shape[0, -1])
+    return tight[:size].tobytes(), RowShape(shape[0, :count], shape[1, :count])
+
+
+def _tabbed(text: NDArray[np.uint8], cells: int, joined: Sequence[int]) -> bytes:
+    """Return what :func:`tabbed` does without compiled code."""
     converted = text.copy()
     converted[text == _TAB] = _BLANK
     is_blank = converted == _BLANK
@@ -162,66 +173,70 @@ def tabbed(text: NDArray[np.uint8], cells: int = 0, joined: Sequence[int] = ()) 
 
 
 @in_place
-def tighten(text: Any, tight: Any, shape: Any, cells: int, is_joined: Any) -> int:
-    """Write lines with a tab between cells and no other blanks; return their length.
+def tighten(text: Any, tight: Any, shape: Any, keeps_blanks: bool, cells: int, is_joined: Any) -> int:
+    """Write lines with a tab between cells and no other blanks, and return their length.
 
-    A line that begins with blanks keeps one, and a comment all: they are told by their first character.
+    It is -1 where there are more lines than the shape has room for. A line that begins with blanks keeps one, and a
+    comment all: they are told by their first character.
 
     Parameters
     ----------
     text, tight : ndarray of uint8, shape (n,)
         Lines, the last one ended; receives them.
-    shape : ndarray of int64, shape (2, lines)
-        Receives the place of each line feed in ``tight``, and the number of cells before it.
+    shape : ndarray of int64, shape (2, lines + 1)
+        Receives the place of each line feed in ``tight`` and the number of cells before it; in its last column the
+        number of lines.
+    keeps_blanks : bool
+        Every line keeps its blanks.
     cells : int
         As that of :class:`SpacedSource`.
     is_joined : ndarray of bool, shape (k,)
         Gaps that part no cells in such rows.
     """
-    at, size, most, end, line, count = 0, 0, len(is_joined), len(text), 0, 1
+    at, size, most, end, lines = 0, 0, len(is_joined), len(text), 0
+    first, first_size, gaps, count, before, is_torn = 0, 0, 0, 1, 1, False
+    is_kept = keeps_blanks or (end > 0 and text[0] == 35)
     while at < end:
-        is_comment, gaps, gap = text[at] == 35, 0, 0
-        if most > 0:
-            ahead = at
-            while ahead < end and text[ahead] != 10 and text[ahead] != 13:
-                is_blank = text[ahead] == 32 or text[ahead] == 9
-                was_blank = ahead > at and (text[ahead - 1] == 32 or text[ahead - 1] == 9)
-                gaps += 1 if was_blank and not is_blank else 0
-                ahead += 1
-            gaps -= 1 if text[at] == 32 or text[at] == 9 else 0
-        first = at
-        while at < end:
-            one = text[at]
-            if one > 32:
-                tight[size] = one
-                size += 1
+        one = text[at]
+        if one > 32:
+            tight[size] = one
+            size += 1
+            at += 1
+        elif one == 32 or one == 9:
+            start = at
+            while at < end and (text[at] == 32 or text[at] == 9):
                 at += 1
-            elif one == 32 or one == 9:
-                start = at
-                while at < end and (text[at] == 32 or text[at] == 9):
-                    at += 1
-                is_last = at == end or text[at] == 10 or text[at] == 13
-                is_inside = start > first and not is_last
-                kept = at - start - (1 if is_inside else 0) if is_comment else 1 if start == first else 0
-                for _blank in range(kept):
-                    tight[size] = 32
-                    size += 1
-                if is_inside:
-                    is_part = gaps == cells - 1 or (at < end and (48 <= text[at] <= 57 or text[at] in (43, 45, 46)))
-                    is_blank = gap < most and is_joined[gap] and is_part
-                    tight[size] = 32 if is_blank else 9
-                    count += 0 if is_blank else 1
-                    size += 1
-                    gap += 1
-            else:
-                if one == 10:
-                    shape[0, line], shape[1, line] = size, count
-                    line, count = line + 1, 1
-                tight[size] = one
+            is_inside = start > first and at < end and text[at] != 10 and text[at] != 13
+            left = at - start - (1 if is_inside else 0) if is_kept else 1 if start == first else 0
+            for _blank in range(left):
+                tight[size] = 32
                 size += 1
-                at += 1
-                if one == 10 or one == 13:
-                    break
+            if is_inside:
+                is_part = not is_torn or 48 <= text[at] <= 57 or text[at] == 43 or text[at] == 45 or text[at] == 46
+                is_blank = gaps < most and is_joined[gaps] and is_part
+                tight[size] = 32 if is_blank else 9
+                count += 0 if is_blank else 1
+                size += 1
+                gaps += 1
+        else:
+            ends = one == 10 or one == 13
+            if ends and most > 0 and gaps != cells - 1 and not is_torn:
+                # Such a row must not look whole with its parts taken for columns: it is written again.
+                at, size, gaps, is_torn = first, first_size, 0, True
+                count = before  # cells before a lone carriage return are of the same line
+                continue
+            if one == 10:
+                if lines == shape.shape[1] - 1:
+                    return -1
+                shape[0, lines], shape[1, lines] = size, count
+                lines, count = lines + 1, 1
+            tight[size] = one
+            size += 1
+            at += 1
+            if ends:
+                first, first_size, gaps, is_torn, before = at, size, 0, False, count
+                is_kept = keeps_blanks or (at < end and text[at] == 35)
+    shape[0, shape.shape[1] - 1] = lines
     return size
 
 
@@ -251,13 +266,98 @@ class FixedSource(MadeSource):
     @cached_property
     def _written(self) -> tuple[BinaryIO, int]:
         file, size = unnamed_file(), 0
-        ends = np.cumsum(self.widths)[:-1].tolist()
         with self.whole.open() as stream:
-            for line in iter(lambda: stream.readline(_PIECE_BYTES), b""):
-                content = line.rstrip(b"\r\n")
-                cells = [content[at:end] for at, end in zip((0, *ends), (*ends, None), strict=True)]
-                is_row = bool(content.strip()) and not content.startswith(b"#")
-                made = b"\t".join(cells) + line[len(content) :] if is_row else line
-                size += file.write(made)
+            rest = b""
+            while data := stream.read(_PIECE_BYTES):
+                end = data.rfind(b"\n") + 1
+                if not end and len(rest) < _PIECE_BYTES:
+                    rest += data
+                    continue
+                size += file.write(self._parted(rest + data[:end] if end else rest))
+                rest = data[end:] if end else data
+        size += file.write(self._parted(rest))
         file.flush()
         return file, size
+
+    def rows(self, lines: bytes) -> tuple[bytes, RowShape | None]:
+        """Return the lines, and their shape."""
+        return lines, shape_of(lines, "\t", is_compiled=True)
+
+    def _parted(self, lines: bytes) -> bytes:
+        """Return lines with a tab between the columns."""
+        bounds = (0, *np.cumsum(self.widths)[:-1].tolist())
+        count = lines.count(b"\n")
+        if len(lines) < COMPILED_BYTES or count * len(bounds) > _MOST_TABS or not lines.endswith(b"\n"):
+            return b"".join(_parted_line(line, bounds) for line in io.BytesIO(lines))
+        text, made = np.frombuffer(lines, np.uint8), np.empty(len(lines) + count * len(bounds), np.uint8)
+        return made[: part(text, made, np.array(bounds, np.int64), b'"' in lines)].tobytes()
+
+
+def _parted_line(line: bytes, bounds: Sequence[int]) -> bytes:
+    """Return a line with a tab before each column but the first.
+
+    A line without an end has no cells behind the place where it is cut.
+    """
+    content = line.rstrip(b"\r\n")
+    if not content.strip() or content.startswith(b"#"):
+        return line
+    if not line.endswith(b"\n"):
+        bounds = [at for at in bounds if at < len(content)]
+    cells = [content[at:end] for at, end in zip(bounds, (*bounds[1:], None), strict=True)]
+    return b"\t".join(cells) + line[len(content) :]
+
+
+@in_place
+def part(text: Any, made: Any, bounds: Any, has_quotes: bool) -> int:
+    """Write lines with a tab before each column but the first; return their length.
+
+    A row that begins with a number loses the blanks around its cells, but for one in front of the first; not where
+    there are quotes. Blank lines and comments stay as they are.
+
+    Parameters
+    ----------
+    text, made : ndarray of uint8
+        Lines, each ended; receives them.
+    bounds : ndarray of int64, shape (columns,)
+        First byte of each column in a line.
+    """
+    at, size, columns = 0, 0, len(bounds)
+    while at < len(text):
+        first = at
+        while text[at] != 10:
+            at += 1
+        at += 1
+        end = at - 1
+        while end > first and text[end - 1] == 13:
+            end -= 1
+        behind = first
+        while behind < end and (text[behind] == 32 or 9 <= text[behind] <= 13):
+            behind += 1
+        if behind == end or text[first] == 35:
+            for place in range(first, at):
+                made[size] = text[place]
+                size += 1
+            continue
+        one = text[behind]
+        is_tight = not has_quotes and (48 <= one <= 57 or one == 43 or one == 45 or one == 46)
+        for column in range(columns):
+            start = min(first + bounds[column], end)
+            stop = min(first + bounds[column + 1], end) if column + 1 < columns else end
+            if column:
+                made[size] = 9
+                size += 1
+            elif is_tight and start < stop and text[start] == 32:
+                made[size] = 32
+                size += 1
+            if is_tight:
+                while start < stop and text[start] == 32:
+                    start += 1
+                while stop > start and text[stop - 1] == 32:
+                    stop -= 1
+            for place in range(start, stop):
+                made[size] = text[place]
+                size += 1
+        for place in range(end, at):
+            made[size] = text[place]
+            size += 1
+    return size

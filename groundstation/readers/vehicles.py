@@ -12,24 +12,21 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.csv as pa_csv
-from numpy.typing import NDArray
 
 from groundstation.base import arrow_values as arrow
-from groundstation.base.records import BoolArray, Int64Array, Remark
+from groundstation.base.records import Int64Array, Remark
 from groundstation.readers.cells import trimmed
 from groundstation.readers.compressed import unnamed_file
 from groundstation.readers.dialect import Dialect
 from groundstation.readers.losses import Losses
 from groundstation.readers.positioned import Positioned
+from groundstation.readers.row_shapes import RowShape, cell_places, shape_of
 from groundstation.readers.rows import RowBlock, RowScanner
 from groundstation.readers.sections import MOST, TableSection
 from groundstation.readers.source import MadeSource, Source
 
 if TYPE_CHECKING:
     from _typeshed import WriteableBuffer
-
-_LF = 10
 
 
 @dataclass(frozen=True)
@@ -47,6 +44,11 @@ class GroupedSource(MadeSource):
 
     file: BinaryIO
     chunks: tuple[_Chunk, ...]
+    delimiter: str
+
+    def rows(self, lines: bytes) -> tuple[bytes, RowShape | None]:
+        """Return the lines, and their shape."""
+        return lines, shape_of(lines, self.delimiter, is_compiled=True)
 
     @property
     def size(self) -> int:
@@ -116,7 +118,7 @@ def by_vehicle(
         None where no row tells its vehicle.
     """
     file, chunks, at = unnamed_file(), dict[str, list[_Chunk]](), 0
-    for block in RowScanner(source, section.dialect, losses):
+    for block in RowScanner(source, section.dialect, losses, is_compiled=True):
         for key, rows, lines in _parted(block, section.dialect, column):
             if not key:
                 losses.add("dropped_rows", f"rows without a {name}", lines)
@@ -141,7 +143,7 @@ def by_vehicle(
         sections.append(replace(section, dialect=replace(dialect, end_byte=end_byte), facts=facts))
         first_byte, first_line = end_byte, first_line + counts[key] + 1  # a place for the log that begins there
     text = f"{len(kept)} vehicles by {name}, a log each; records are numbered vehicle by vehicle, the last one first"
-    found = GroupedSource(source.path, file, tuple(one for key in kept for one in chunks[key]))
+    found = GroupedSource(source.path, file, tuple(one for key in kept for one in chunks[key]), dialect.delimiter)
     return Vehicles(found, tuple(sections), Remark("vehicles", text))
 
 
@@ -150,38 +152,31 @@ def _parted(block: RowBlock, dialect: Dialect, column: int) -> Iterator[tuple[st
 
     Its name is empty where none is told.
     """
-    keys = _keys(block, dialect, column).dictionary_encode(null_encoding="encode")
+    first, behind, ends = cell_places(block.text, dialect.delimiter, dialect.cells, column)
+    starts = np.concatenate(([0], ends[:-1] + 1))
+    keys = _texts(block.text, first, behind).dictionary_encode(null_encoding="encode")
     codes = arrow.values(keys.indices, 0).astype(np.int64)
-    text = np.frombuffer(block.text, dtype=np.uint8)
-    ends = np.flatnonzero(text == _LF) + 1
-    starts = np.concatenate(([0], ends[:-1]))
+    order = np.argsort(codes, kind="stable")
+    groups = np.split(order, np.flatnonzero(np.diff(codes[order])) + 1)
     names = [word or "" for word in keys.dictionary.to_pylist()]
-    for code in dict.fromkeys(codes.tolist()):
-        is_own = codes == code
-        yield names[code], _rows(text, starts, ends, is_own), block.line_numbers[is_own]
+    for own in sorted(groups, key=lambda rows: int(rows[0])):
+        yield names[codes[own[0]]], _rows(block.text, starts, ends, own), block.line_numbers[own]
 
 
-def _rows(text: NDArray[np.uint8], starts: Int64Array, ends: Int64Array, wanted: BoolArray) -> bytes:
-    """Return some of the rows of a text."""
-    changes = np.flatnonzero(np.diff(wanted, prepend=False, append=False))
+def _rows(text: bytes, starts: Int64Array, ends: Int64Array, wanted: Int64Array) -> bytes:
+    """Return some of the rows of a text, in their order."""
+    breaks = np.flatnonzero(np.diff(wanted) != 1)
+    first, last = wanted[np.concatenate(([0], breaks + 1))], wanted[np.append(breaks, len(wanted) - 1)]
     return b"".join(
-        text[starts[first] : ends[last - 1]].tobytes() for first, last in zip(changes[::2], changes[1::2], strict=True)
+        [text[start : end + 1] for start, end in zip(starts[first].tolist(), ends[last].tolist(), strict=True)]
     )
 
 
-def _keys(block: RowBlock, dialect: Dialect, column: int) -> Any:
-    names = [str(number) for number in range(dialect.cells)]
-    table = pa_csv.read_csv(
-        pa.BufferReader(block.text),
-        read_options=pa_csv.ReadOptions(column_names=names, use_threads=False, block_size=len(block.text) + 1),
-        parse_options=pa_csv.ParseOptions(
-            delimiter=dialect.delimiter, quote_char=False, escape_char=False, ignore_empty_lines=False
-        ),
-        convert_options=pa_csv.ConvertOptions(
-            column_types={str(column): pa.string()},
-            include_columns=[str(column)],
-            null_values=[""],
-            strings_can_be_null=True,
-        ),
-    )
-    return trimmed(table.column(str(column)).combine_chunks())
+def _texts(text: bytes, starts: Int64Array, ends: Int64Array) -> Any:
+    """Return trimmed cells as an arrow array, null where empty."""
+    sizes = ends - starts
+    behind = np.cumsum(sizes)
+    places = np.arange(behind[-1]) + np.repeat(starts - behind + sizes, sizes)
+    content = pa.py_buffer(np.frombuffer(text, np.uint8)[places])
+    offsets = pa.py_buffer(np.append(np.int32(0), behind.astype(np.int32)))
+    return trimmed(pa.Array.from_buffers(pa.string(), len(sizes), [None, offsets, content]))
