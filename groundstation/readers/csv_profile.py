@@ -26,14 +26,14 @@ from groundstation.readers.profile import Profile
 from groundstation.readers.profile_file import load, shipped
 from groundstation.readers.profile_fit import Fit, delimiter_of, delimiters_of, fit_at, fit_below, joined_gaps
 from groundstation.readers.profile_layout import layout_of
-from groundstation.readers.profile_sources import other_profiles
+from groundstation.readers.profile_sources import READER, other_profiles
 from groundstation.readers.rtklib_tag import TaggedClock, clock_by_tag
 from groundstation.readers.sections import MOST, TableSection, header_places, left_out, lines_with, mark_of, told
 from groundstation.readers.source import Claim, Source
 from groundstation.readers.spaced import FixedSource, SpacedSource
 from groundstation.readers.start import unusable_references, utc_of_zero
 
-NAME = "csv-profile"
+NAME = READER
 DISTINCTIVE_COLUMNS = 4
 _HEAD_LINES = 1000
 DAMAGED_HEAD_LINES = 20  # lines searched for a header row when the first line is not the profile's

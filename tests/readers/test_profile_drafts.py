@@ -12,10 +12,14 @@ from typer.testing import CliRunner
 
 from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
 from groundstation.cli.main import app
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.log import open_log
+from groundstation.pipeline.one_flight.resume import Keys, keys_of
 from groundstation.pipeline.verbs.profiles import findings_of, new_profile, try_profile
 from groundstation.readers import csv_profile, profile_sources, registry
 from groundstation.readers.drafts.words import meaning_of
 from groundstation.readers.profile_file import load
+from tests.conftest import forget_profiles
 from tests.readers.test_flat_csv import Read
 
 RADIUS_M, SPEED_MPS, LATITUDE_DEG = 100.0, 10.0, 50.0
@@ -302,20 +306,6 @@ def test_the_nearest_profile_and_what_is_missing_are_told(write: Write) -> None:
         registry.identify(table)
 
 
-@pytest.fixture
-def own_profiles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """The user's folder of profiles, empty."""
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
-    caches = (profile_sources.other_profiles, csv_profile.known_profiles, registry._plug_ins)
-    folder = tmp_path / "config/groundstation/profiles"
-    folder.mkdir(parents=True)
-    for one in caches:
-        one.cache_clear()
-    yield folder
-    for one in caches:
-        one.cache_clear()
-
-
 def test_a_profile_in_the_users_folder_is_found_by_the_header(own_profiles: Path, write: Write) -> None:
     (own_profiles / "mine.toml").write_text(PROFILE.replace("Hdg", "Heading").replace('"p"', '"mine"'))
     (own_profiles / "bad.toml").write_text("name = 1")
@@ -329,6 +319,31 @@ def test_a_profile_in_the_users_folder_is_found_by_the_header(own_profiles: Path
     other = write("b.csv", TABLE.replace("Heading", "Head"))
     with pytest.raises(UnclaimedLogError, match="nearest is profile mine: it lacks Heading"):
         registry.identify(other)
+
+
+def test_what_a_profile_of_the_user_says_is_part_of_the_key_of_a_run(own_profiles: Path, write: Write) -> None:
+    """A run that is continued after the profile was changed makes the results anew."""
+    table, text = write("a.csv", TABLE), PROFILE.replace("Hdg", "Heading").replace('"p"', '"mine"')
+
+    def keys() -> Keys:
+        forget_profiles()
+        return keys_of(open_log(table).source, Configuration())
+
+    (own_profiles / "mine.toml").write_text(text)
+    first = keys()
+    (own_profiles / "other.toml").write_text(PROFILE.replace("Hdg", "Foo").replace('"p"', '"other"'))
+    assert keys() == first  # nothing that the log was read by
+    (own_profiles / "mine.toml").write_text(text.replace("ins.true_heading_deg", "ins.magnetic_heading_deg"))
+    assert keys().conversion != first.conversion
+    (own_profiles / "mine.toml").unlink()
+    with pytest.raises(UnclaimedLogError):
+        keys()
+
+
+def test_a_shipped_profile_asked_for_by_its_name_has_a_key(write: Write) -> None:
+    table = write("track.txt", "1714989600.0 0 0 0 0 0 0 1\n1714989600.1 1 0 0 0 0 0 1\n")
+    source = open_log(table, Path("tum")).source
+    assert keys_of(source, Configuration(profile="tum")) != keys_of(source, Configuration(profile="kitti-oxts"))
 
 
 def test_a_profile_of_a_plug_in_is_found(own_profiles: Path, write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
