@@ -32,7 +32,7 @@ RAW = "raw.flysight"
 LINES = 20_000  # read at a time
 _LOOKED_AT, _LONGEST_LINE, _MOST_CELLS = 1 << 16, 1 << 12, 200
 _FIRST = (b"$FLYS,", b"\xef\xbb\xbf$FLYS,")
-_VARIABLES = {"FIRMWARE_VER": "firmware", "DEVICE_ID": "serial_number", "SESSION_ID": "session"}
+_VARIABLES = {"FIRMWARE_VER": "firmware", "DEVICE_ID": "serial_number", "SESSION_ID": "session_id"}
 _FIXES, _PRESSURES, _WEEKS = "GNSS", "BARO", "TIME"
 # Column of a fix -> field, and the unit that it must have.
 _FIELDS: Mapping[str, tuple[str, str]] = {
