@@ -34,6 +34,9 @@ _DMS = (
     r"(?P<minutes>\d{1,2}(?:\.\d*)?)(?:\s*[:'′m]\s*|\s+|$)"
     r"(?P<seconds>(?:\d{1,2}(?:\.\d*)?)?)\s*[\"″s]?\s*(?P<behind>[NSEWnsew]?)\s*$"
 )
+_SIDED = (
+    r"^\s*(?P<before>[NSEWnsew]?)\s*(?P<sign>[+-]?)\s*(?P<degrees>\d{1,3}(?:\.\d*)?)\s*°?\s*(?P<behind>[NSEWnsew]?)\s*$"
+)
 _SLASHED = re.compile(r"\d{4}[/.]\d{1,2}[/.]\d{1,2}\b")
 _TWO_SIGNS = r"^\+-"  # a Garmin G5 writes its plus in front of every number
 _NOT_TEXT = r"[\x00-\x08\x0a-\x1e\x7f\x{FFFD}]"
@@ -88,19 +91,22 @@ def degrees(text: Any, among_parts: bool = False) -> TableCells:
     """Convert degrees, minutes and seconds in one cell to degrees; plain degrees go through.
 
     The parts may be parted by blanks, colons or their signs; the seconds may be absent. A sign stands before, or a
-    letter N, S, E or W on either side. ``among_parts``: other cells of the column have minutes.
+    letter N, S, E or W on either side, of plain degrees too. ``among_parts``: other cells of the column have minutes.
 
     Examples
     --------
-    >>> read = degrees(pa.array(["-0 30 00", "47:12:36.0", "8 30.5 W", "12°30′18″S", "-8.5", "47 61 0"]))
+    >>> read = degrees(pa.array(["-0 30 00", "47:12:36.0", "8 30.5 W", "12°30′18″S", "-8.5", "47 61 0", "8.25W"]))
     >>> read.column.values.tolist(), read.unreadable.tolist()
-    ([-0.5, 47.21, -8.508333333333333, -12.505, -8.5, nan], [False, False, False, False, False, True])
+    ([-0.5, 47.21, -8.508333333333333, -12.505, -8.5, nan, -8.25], [False, False, False, False, False, True, False])
     """
     array, unreadable = _cast(text, pa.float64(), _NUMBER, is_sound=not among_parts)
     if not unreadable.any():
         return TableCells(_column(array, float("nan")), unreadable)
-    parts = pc.extract_regex(text, _DMS)
+    parts, plain_parts = pc.extract_regex(text, _DMS), pc.extract_regex(text, _SIDED)
     before, sign, whole, minutes, seconds, behind = (pc.struct_field(parts, [at]) for at in range(6))
+    before, sign, whole, behind = (
+        pc.coalesce(one, pc.struct_field(plain_parts, [at])) for at, one in enumerate((before, sign, whole, behind))
+    )
     found = arrow.is_valid(whole)
     values = [_part_values(one) for one in (whole, minutes, seconds)]
     found &= (values[1] < 60.0) & (values[2] < 60.0)

@@ -11,7 +11,7 @@ from groundstation.base.timescales import gps_week_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.readers import cells
 from groundstation.readers.cells import TableCells
-from groundstation.readers.dates import local_ns, time_of_day_ns
+from groundstation.readers.dates import local_ns, parted, time_of_day_ns
 from groundstation.readers.days import DayCount
 from groundstation.readers.layout import TimeRule
 
@@ -44,7 +44,7 @@ def times_of(rule: TimeRule, texts: Sequence[Any], days: DayCount) -> tuple[Tabl
 
 
 def utc_of(texts: Sequence[Any], date_formats: tuple[str, ...]) -> tuple[TableCells, int]:
-    """Return UTC of one column (ISO 8601) or of date, time and offset.
+    """Return UTC of one column (ISO 8601) or of date, time and offset; the first two may be the same.
 
     Returns also the number of times without a zone.
     """
@@ -52,7 +52,8 @@ def utc_of(texts: Sequence[Any], date_formats: tuple[str, ...]) -> tuple[TableCe
         read, zoneless = cells.iso_ns(texts[0])
         return read, int(zoneless.sum())
     offset = texts[2] if len(texts) > 2 else None
-    read = local_ns(texts[0], texts[1], offset, date_formats)
+    date, time = parted(texts[0], date_formats) if texts[0] is texts[1] else texts[:2]
+    read = local_ns(date, time, offset, date_formats)
     return read, 0 if offset is None else int(np.count_nonzero(read.column.mask & ~arrow.is_valid(offset)))
 
 
