@@ -83,7 +83,8 @@ def part_of(text: Any, number: int) -> Any:
     >>> part_of(pa.array(["47.5 -8.25", "47.5", None]), 2).to_pylist()
     ['-8.25', None, None]
     """
-    words = pc.extract_regex(text, rf"^(?:\S+[ ,]+){{{number - 1}}}(?P<word>[^\s,]+)")
+    # \x1f stands for a delimiter that stood inside quotes
+    words = pc.extract_regex(text, rf"^(?:[^\s,;\x1f]+[\s,;\x1f]+){{{number - 1}}}(?P<word>[^\s,;\x1f]+)")
     return pc.struct_field(words, [0])
 
 
@@ -117,6 +118,27 @@ def degrees(text: Any, among_parts: bool = False) -> TableCells:
     values_deg = np.where(plain, arrow.values(array, float("nan")), np.where(is_minus, -size, size))
     present = plain | found
     return TableCells(Column(np.where(present, values_deg, np.nan), present), arrow.is_valid(text) & ~present)
+
+
+def degrees_and_minutes(text: Any) -> TableCells:
+    """Convert degrees and minutes that are run together, as receivers write them, to degrees.
+
+    A sign stands before, or a letter N, S, E or W behind.
+
+    Examples
+    --------
+    >>> read = degrees_and_minutes(pa.array(["4730.6", "-00815.0", "12215.6W", "4761.0", None]))
+    >>> read.column.values.tolist(), read.unreadable.tolist()
+    ([47.51, -8.25, -122.26, nan, nan], [False, False, False, True, False])
+    """
+    parts = pc.extract_regex(text, r"^\s*(?P<number>[+-]?\d+(?:\.\d*)?)\s*(?P<side>[NSEWnsew]?)\s*$")
+    read = numbers(pc.struct_field(parts, [0]))
+    is_minus = arrow.mask(pc.fill_null(pc.match_substring_regex(pc.struct_field(parts, [1]), "[SWsw]"), arrow.FALSE))
+    size = np.abs(read.column.values)
+    whole, minutes = np.divmod(size, 100.0)
+    present = read.column.mask & (minutes < 60.0)
+    values = np.copysign(whole + minutes / 60.0, read.column.values) * np.where(is_minus, -1.0, 1.0)
+    return TableCells(Column(np.where(present, values, np.nan), present), arrow.is_valid(text) & ~present)
 
 
 def _part_values(text: Any) -> NDArray[np.float64]:

@@ -44,9 +44,9 @@ def times_of(rule: TimeRule, texts: Sequence[Any], days: DayCount) -> tuple[Tabl
 
 
 def utc_of(texts: Sequence[Any], date_formats: tuple[str, ...]) -> tuple[TableCells, int]:
-    """Return UTC of one column (ISO 8601) or of date, time and offset; the first two may be the same.
+    """Return UTC of one column (ISO 8601) or of date, time and offset.
 
-    Returns also the number of times without a zone.
+    Date and time may be the same column. Returns also the number of times without a zone.
     """
     if len(texts) == 1:
         read, zoneless = cells.iso_ns(texts[0])

@@ -219,8 +219,6 @@ def test_names_and_what_they_mean(name: str, target: str, unit: str) -> None:
 
 CAUSES = {
     "minutes and seconds alone": "time,lat,lon\n12:03.5,1.5,2\n12:03.6,1.5,2\n12:03.7,1.5,2\n",
-    "US dates (month/day/year)": "time,lat,lon\n6/23/2021 2:13:51 PM,1.5,2\n6/23/2021 2:13:52 PM,1.5,2\n",
-    "day and month cannot be told apart": "time,lat,lon\n5/6/2021 2:13:51,1.5,2\n5/6/2021 2:13:52,1.5,2\n",
     "a decimal comma in quotes": 'time,lat,lon\n"1,5","55,1","37,1"\n"2,5","55,1","37,1"\n',
 }
 
@@ -235,6 +233,21 @@ def test_errors_name_the_cause(write: Write, cause: str) -> None:
     assert cause in told and told.count(cause) == (3 if "quotes" in cause else 1)
     code, _, err = groundstation("profile", "check", str(profile), str(table))
     assert code in (1, 3) and err.count("\n") <= 1
+
+
+US = "time,lat,lon\n" + "".join(f"{{0}}/{{1}}/2021 2:13:{s} PM,55.{s},37.5\n" for s in range(50, 60))
+
+
+def test_us_dates_are_told_and_read_by_the_draft(write: Write) -> None:
+    table = write("a.csv", US.format(6, 23))
+    profile, text = drafted(table)
+    assert 'date_formats = ["%m/%d/%Y"]' in text and "month before day, as in the US" in text
+    assert Read(table, profile).times("gnss")[0] == 1_624_457_630_000_000_000  # 2021-06-23T14:13:50Z
+    with pytest.raises(UnclaimedLogError, match="time: month before day, as in the US"):
+        registry.identify(table)
+    by_another = " ".join(one.text for one in findings_of(try_profile(write("p.toml", PROFILE), table)))
+    assert "US dates (month/day/year), such as '6/23/2021 2:13:50 PM'" in by_another
+    assert "day and month cannot be told apart" in " ".join(new_profile(write("b.csv", US.format(5, 6))).doubts)
 
 
 @pytest.mark.parametrize("coding", ["utf-16", "utf-16-le"])

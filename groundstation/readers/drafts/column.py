@@ -9,7 +9,8 @@ from groundstation.base.toml_text import quoted
 class ColumnGuess:
     """One column: what it becomes, and why.
 
-    ``target`` is empty where it is left; ``doubt`` is what the user has to look at.
+    ``target`` is empty where it is left; ``doubt`` is what the user has to look at. ``is_pair``: latitude and longitude
+    stand in each cell, and ``target`` is the latitude.
     """
 
     at: int
@@ -23,6 +24,7 @@ class ColumnGuess:
     doubt: str = ""
     north: str = ""
     offset: float = 0.0
+    is_pair: bool = False
 
     @property
     def line(self) -> str:
@@ -32,6 +34,13 @@ class ColumnGuess:
         unit = f", unit = {quoted(self.unit)}" * bool(self.unit)
         offset = f", offset = {self.offset:.9g}" * bool(self.offset)
         north = f", north = {quoted(self.north)}" * bool(self.north)
+        if self.is_pair:
+            east = self.target.replace("latitude", "longitude")
+            parts = (
+                f"{{ field = {quoted(target)}, unit = {quoted(self.unit)}, part = {number} }}"
+                for number, target in enumerate((self.target, east), start=1)
+            )
+            return f"{quoted(self.name)} = [{', '.join(parts)}]" + (f"  # {self.values}" if self.values else "")
         entry = f"{quoted(self.name)} = {{ field = {quoted(self.target)}{unit}{scale}{sign}{offset}{north} }}"
         notes = "; ".join(filter(None, (self.values, self.why, f"? {self.doubt}" if self.doubt else "")))
         return f"{entry}  # {notes}" if notes else entry

@@ -4,7 +4,7 @@ What the values show wins over what is assumed, and what the header tells over b
 question mark in the draft.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from groundstation.readers.drafts.column import ColumnGuess
@@ -51,15 +51,15 @@ class Draft:
         return (*told, *(f"{one.name}: {one.doubt}" for one in self.columns if one.doubt))
 
 
-def draft_of(source: Source) -> Draft:
-    """Return the draft of a profile for a table.
+def draft_of(source: Source, names: Sequence[str] = ()) -> Draft:
+    """Return the draft of a profile for a table, with names for one that has none.
 
     Raises
     ------
     UnreadableLogError
         When the file is no table, or has no time that can be read; the cause is named.
     """
-    sample = sample_of(source)
+    sample = sample_of(source, names)
     time = time_of(sample)
     guesses = Guesses(sample, time).columns()
     return Draft(

@@ -16,6 +16,7 @@ from groundstation.readers.drafts.axes import turned
 from groundstation.readers.drafts.causes import are_angles, cause_of_numbers
 from groundstation.readers.drafts.column import ColumnGuess, both
 from groundstation.readers.drafts.motion import Motion, motion_of
+from groundstation.readers.drafts.positions import degrees_of, in_unit, is_pair, pair_of
 from groundstation.readers.drafts.sample import TableSample
 from groundstation.readers.drafts.times import TimeGuess
 from groundstation.readers.drafts.words import words_of
@@ -25,6 +26,7 @@ _FULL_FIELD_NT = 47_000.0  # the field of the Earth is 25 000 to 65 000 nT
 _DIRECTIONS = ("true_heading_deg", "magnetic_heading_deg", "track_deg")
 _FROM_EAST_DEG = 45.0
 _UPRIGHT = 0.7  # share of gravity that an axis has which is called vertical
+_LEAST_TURN_DPS = 2.0  # slower turns show no unit of a gyro
 _ANGLES = ("roll_deg", "pitch_deg", *_DIRECTIONS)
 
 
@@ -52,6 +54,7 @@ class Guesses:
                 self._by_target[guess.target] = guess
         self._drop_parts(found)
         moved = self._motion()
+        found |= {one.at: one for one in self._by_target.values()}
         for at, guess in found.items():
             found[at] = self._in_unit(guess, moved) if guess.target else guess
         return tuple(replace(one, values=one.values or self._values(one.at)) for one in found.values())
@@ -62,6 +65,8 @@ class Guesses:
         left = ColumnGuess(at, name)
         if not any(sample.columns[at]):
             return replace(left, why="empty")
+        if "gnss.latitude_deg" not in self._by_target and is_pair(sample, at):
+            return replace(left, target="gnss.latitude_deg", unit="deg", is_pair=True)
         if meaning is None or not meaning.field:
             return left
         known = field_of(meaning.topic, meaning.field)
@@ -88,41 +93,35 @@ class Guesses:
         groups += [tuple(f"{topic}.{name}_deg" for name in ("latitude", "longitude")) for topic in ("gnss", "ins")]
         for group in groups:
             there = [self._by_target[target] for target in group if target in self._by_target]
+            there = [] if any(one.is_pair for one in there) else there
             if 0 < len(there) < len(group):
                 for one in there:
                     found[one.at] = ColumnGuess(one.at, one.name, why=f"{one.target} without the others of its kind")
                     del self._by_target[one.target]
 
     def _motion(self) -> Motion | None:
-        """Return the motion of the positions in degrees, None where there are none."""
+        """Return the motion of the positions, None where there are none."""
+        sizes = [len(block) for block in self._sample.blocks]
         for topic in ("gnss", "ins"):
-            pair = [self._by_target.get(f"{topic}.{name}_deg") for name in ("latitude", "longitude")]
-            if pair[0] is not None and pair[1] is not None:
-                latitude, longitude = (self._sample.numbers(one.at) * self._to_degrees(one) for one in pair if one)
-                sizes = [len(block) for block in self._sample.blocks]
-                return motion_of(latitude, longitude, self._time.seconds, sizes)
+            north, east = (self._by_target.get(f"{topic}.{name}_deg") for name in ("latitude", "longitude"))
+            if north is not None and north.is_pair:
+                return motion_of(*pair_of(self._sample, north.at), self._time.seconds, sizes)
+            if north is not None and east is not None:
+                both = (in_unit(self._sample, north, east), in_unit(self._sample, east, north))
+                degrees = [degrees_of(self._sample, one) for one in both]
+                moved = motion_of(*degrees, self._time.seconds, sizes)
+                mirrored = motion_of(degrees[0], -degrees[1], self._time.seconds, sizes)
+                if both[1].unit != "arcmin" or not self._is_followed(mirrored):
+                    return moved
+                doubt = "minutes of arc, positive to the west by the heading"
+                self._by_target[east.target] = replace(both[1], sign=-1, doubt=doubt)
+                return mirrored
         return None
 
-    def _to_degrees(self, guess: ColumnGuess) -> float:
-        unit = self._unit_of_position(guess)[0]
-        return CONVERSIONS[unit][1] * guess.scale if unit in CONVERSIONS else np.nan
-
-    def _unit_of_position(self, guess: ColumnGuess) -> tuple[str, str]:
-        """Return the unit of a latitude or longitude, and a doubt."""
-        if guess.unit and guess.unit != "deg":
-            return guess.unit, ""
-        most = 90.0 if "latitude" in guess.target else 180.0
-        values = self._sample.numbers(guess.at)
-        largest = float(np.nanpercentile(np.abs(values), 99))
-        if largest <= most:
-            if guess.unit or re.search("[.,]", "".join(self._sample.filled(guess.at)[:20])):
-                return "deg", ""
-            return "deg", "degrees assumed"
-        if largest > 1e5 and largest <= most * 1e7:
-            return "deg1e7", ""
-        if largest <= most * 100 + 60 and float(np.nanmax(np.abs(values) % 100)) < 60.0:
-            return "deg", "looks like degrees and minutes run together (ddmm.mmmm): convert it to degrees"
-        return "deg", f"values beyond {most:g}: not degrees"
+    def _is_followed(self, moved: Motion) -> bool:
+        """Tell whether a direction that is told in degrees is that of a motion."""
+        found = [self._by_target.get(f"{topic}.{name}") for topic in ("gnss", "ins") for name in _DIRECTIONS]
+        return any(one is not None and moved.is_followed(self._sample.numbers(one.at)) for one in found)
 
     def _in_unit(self, guess: ColumnGuess, moved: Motion | None) -> ColumnGuess:
         """Return a guess with its unit: told by the header, shown by the values, or assumed."""
@@ -131,17 +130,20 @@ class Guesses:
         assert known is not None
         if known.kind != "double" or not known.unit:
             return guess
-        values = self._sample.numbers(guess.at) * guess.scale
         if name in ("latitude_deg", "longitude_deg"):
-            unit, doubt = self._unit_of_position(guess)
-            return replace(guess, unit=unit, doubt=doubt)
+            other = "latitude_deg" if name == "longitude_deg" else "longitude_deg"
+            return in_unit(self._sample, guess, self._by_target.get(f"{topic}.{other}"))
+        values = self._sample.numbers(guess.at) * guess.scale
         if name == "ground_speed_mps":
             return self._speed(guess, values, moved)
         if name in _ANGLES:
             return self._angle(guess, values, moved)
         if guess.unit:
             return turned(guess, self._up)
-        return turned(_by_values(guess, known, self._size(guess), self._are_radians()), self._up)
+        turn_dps = None if moved is None else moved.turn_dps(self._time.seconds)
+        found = _by_turn(guess, self._size(guess), turn_dps) if known.unit == "dps" else None
+        found = found or _by_values(guess, known, self._size(guess), self._are_radians())
+        return turned(found, self._up)
 
     def _size(self, guess: ColumnGuess) -> FloatArray:
         """Return the length of the vector whose axis a column is; else the column's own."""
@@ -197,6 +199,8 @@ class Guesses:
     def _speed(self, guess: ColumnGuess, values: FloatArray, moved: Motion | None) -> ColumnGuess:
         """Return a speed in the unit that its header tells, else that the positions show."""
         shown = None if moved is None else moved.unit_of_speed(values / guess.scale)
+        if shown is None and not guess.unit and "sog" in words_of(guess.name):
+            return replace(guess, unit="kt", doubt="knots assumed, as in all that is called SOG")
         if shown is None:
             return guess if guess.unit else replace(guess, unit="mps", doubt="m/s assumed")
         unit, off = shown
@@ -249,10 +253,23 @@ def _family(target: str) -> str:
     return re.sub(r"_(x|y|z|forward|right|down|north|east)_", "_", target)
 
 
+def _by_turn(guess: ColumnGuess, size: FloatArray, turn_dps: float | None) -> ColumnGuess | None:
+    """Return rates in the unit that the turns of the motion show; None where they show none."""
+    finite = size[np.isfinite(size)]
+    middle = float(np.median(finite)) if len(finite) else 0.0
+    if turn_dps is None or turn_dps < _LEAST_TURN_DPS or not middle > 0.0:
+        return None
+    ratios = {unit: middle * CONVERSIONS[unit][1] / turn_dps for unit in ("dps", "radps")}
+    best = min(ratios, key=lambda unit: abs(np.log(ratios[unit])))
+    return replace(guess, unit=best, why="by the turns of the motion") if 0.5 < ratios[best] < 3.0 else None
+
+
 def _by_values(guess: ColumnGuess, known: Field, size: FloatArray, are_radians: bool) -> ColumnGuess:
     """Return a guess whose unit nothing tells, by the size of its values."""
     finite = size[np.isfinite(size)]
     middle = float(np.median(finite)) if len(finite) else 0.0
+    if known.unit == "mps2" and "force" in words_of(guess.name):
+        return replace(guess, unit="g", why="a force in g by its name")
     if known.unit == "mps2" and middle > 0.0:
         choices = {"mps2": (MPS2_PER_G, 1.0), "g": (1.0, 1.0), "mg": (1000.0, 0.001)}
         best = min(choices, key=lambda one: abs(np.log(middle / choices[one][0])))

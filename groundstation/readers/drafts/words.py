@@ -131,8 +131,8 @@ _BODY = {"x": "forward", "y": "right", "z": "down"}
 _BY_ANGLE = {"roll": "x", "pitch": "y", "yaw": "z"}
 # (pattern of the words, topic, field, unit kind, sign)
 _FIELDS: tuple[tuple[str, str, str, str, int], ...] = (
-    (r"lat|latitude|широта", "gnss", "latitude_deg", "deg", 1),
-    (r"lon|lng|long|longitude|longtitude|долгота", "gnss", "longitude_deg", "deg", 1),
+    (r"(?:lat|latitude)(?: n s)?|широта", "gnss", "latitude_deg", "deg", 1),
+    (r"(?:lon|lng|long|longitude|longtitude)(?: e w)?|долгота", "gnss", "longitude_deg", "deg", 1),
     (
         rf"{_ALTITUDE}(?: (?:above )?(?:ellipsoid|ellipsoidal|hae|wgs84|wgs))|hae|h ell|h ellipsoid"
         rf"|(?:ellipsoid|ellipsoidal|wgs84|hae) {_ALTITUDE}",
@@ -163,7 +163,7 @@ _FIELDS: tuple[tuple[str, str, str, str, int], ...] = (
         *("gnss", "ground_speed_mps", "mps", 1),
     ),
     (
-        r"(?:true )?(?:track|course|trk|crs|cog|bearing|ground course|ground track|g course)"
+        r"(?:true )?(?:track|course|trk|crs|cog|bearing|direction|ground course|ground track|g course)"
         r"(?: (?:angle|true|over ground|made good))?|cog true|truetrack|путевой угол|heading motion|heading of motion",
         *("gnss", "track_deg", "deg", 1),
     ),
@@ -228,7 +228,8 @@ _TRIADS: tuple[tuple[str, str, str, str], ...] = (
         *("imu", "rate_{}_dps", "dps"),
     ),
     (
-        r"(?:acc|accel|acceleration|accelerometer|a|f|specific force) ?([xyz])|([xyz]) ?(?:acc|accel|acceleration)",
+        r"(?:acc|accel|acceleration|accelerometer|a|f|specific force|g ?force) ?([xyz])"
+        r"|([xyz]) ?(?:acc|accel|acceleration)",
         "imu",
         "accel_{}_mps2",
         "mps2",
@@ -246,7 +247,7 @@ _ROLES: tuple[tuple[str, str], ...] = (
         r"|update|since)? ?"
         r"(?:time|timestamp|time stamp|date ?time|epoch|t|ts)(?: (?:s|us|usec|utc|boot|unix|stamp|since .*"
         r"|from .*|elapsed"
-        r"|of (?:day|fix)|pc))?|unix|utc|seconds|millis|millisecond|timeusec|seconds elapsed|время"
+        r"|of (?:day|fix)|pc|fine))?|unix|utc|seconds|millis|millisecond|timeusec|seconds elapsed|время"
         r"|date time .*|timestamp .*"
         r"|isodatetime|iso ?8601|base date time|(?:date ?time|time) ?utc|elapsed",
         "time",
@@ -333,7 +334,10 @@ def meaning_of(name: str, units: tuple[str, ...] = ()) -> Meaning | None:
             if topic in ("gnss", "ins"):
                 topic = "gnss" if is_gnss and not is_ins else "ins" if is_ins and not is_gnss else topic
                 topic = topic if _has(topic, found.field) else found.topic
-            return Meaning(topic, found.field, found.sign, found.role, found.unit, found.scale)
+            field = found.field
+            if (topic, field) == ("ins", "true_heading_deg") and is_gnss and not is_ins:
+                topic, field = "gnss", "track_deg"  # what a receiver calls its heading
+            return Meaning(topic, field, found.sign, found.role, found.unit, found.scale)
     return None
 
 

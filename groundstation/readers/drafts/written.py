@@ -30,6 +30,7 @@ def written(sample: TableSample, time: TimeGuess, columns: Sequence[ColumnGuess]
             *(f"# ? {time.doubt}" for _ in range(bool(time.doubt))),
             f"[time]  # {_comment(time.why)}",
             *time.lines,
+            *time.metadata,
             *_key(sample),
             *_variation(sample, used),
             "",
@@ -45,8 +46,11 @@ def written(sample: TableSample, time: TimeGuess, columns: Sequence[ColumnGuess]
 def _recognise(sample: TableSample, time: TimeGuess, used: Sequence[ColumnGuess]) -> Iterator[str]:
     yield "[recognise]"
     if sample.header is None:
-        yield "# ? the table names no columns: put the right names here, and below"
+        if not sample.are_given:
+            yield "# ? the table names no columns: draft it again with --names, or name them here and below"
         yield f"names = [{', '.join(map(quoted, sample.names))}]"
+        if sample.is_spaced:
+            yield 'delimiter = "blanks"'
         return
     places = [one.name for one in used if one.target.endswith(("latitude_deg", "longitude_deg"))]
     needed = (places or [one.name for one in used])[:_MOST_REQUIRED]
