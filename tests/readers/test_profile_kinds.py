@@ -221,3 +221,46 @@ def test_names_behind_the_sign_of_a_comment_with_blanks(write: Write) -> None:
     at = write("a.txt", "# t lat lon\n" + rows)
     profile, _text = drafted(at)
     assert len(Read(at, profile).values("gnss", "latitude_deg")) == 50
+
+
+def test_a_comment_below_the_names_is_no_row_of_units(write: Write) -> None:
+    rows = "".join(f"{1000 * t:.0f};{n:.7f};{e:.7f};\n".replace(".", ",") for t, n, e, _ in circle(20))
+    at = write("a.csv", "# logger\ntime_ms;lat;lon;\n# mark 1\n" + rows)
+    profile, text = drafted(at)
+    assert "rows_after_header" not in text
+    assert len(Read(at, profile).values("gnss", "latitude_deg")) == 20
+
+
+def test_variances_become_sigmas(write: Write) -> None:
+    head = '"time","lat","lon","cov_ee","cov_nn (m^2)","height_var"\n'
+    at = write("a.csv", table(head, lambda t, n, e, d: f"{unix_s(t)},{n:.7f},{e:.7f},0.04,0.09,4\n"))
+    profile, text = drafted(at)
+    assert '"cov_nn (m^2)" = { field = "gnss.position_north_sigma_m", unit = "m", variance = true }' in text
+    read = Read(at, profile)
+    sigmas = ("position_north_sigma_m", "position_east_sigma_m", "vertical_sigma_m")
+    assert [read.values("gnss", name)[0] for name in sigmas] == pytest.approx([0.3, 0.2, 2.0])
+
+
+def test_seconds_of_the_week_alone_and_weeks_that_rolled_over(write: Write) -> None:
+    rows = [(604_780 + t, n, e) for t, n, e, _ in circle(60)]
+    alone = write("a.csv", "iTOW,lat,lon\n" + "".join(f"{1000 * (s % 604_800):.0f},{n},{e}\n" for s, n, e in rows))
+    draft = new_profile(alone)
+    assert 'unit = "ms"' in draft.text and any("without the week: no absolute time" in one for one in draft.doubts)
+    weeks = write(
+        "b.csv",
+        "Week,SOW,lat,lon\n" + "".join(f"{265 + int(s // 604_800)},{s % 604_800},{n},{e}\n" for s, n, e in rows),
+    )
+    profile, text = drafted(weeks)
+    assert "earliest_year = 2000" in text
+    read = Read(weeks, profile)
+    times = read.times("gnss")
+    assert times[0] == iso_to_utc_ns("2004-09-25T23:59:27Z")[0] and times[-1] - times[0] == 29_500_000_000
+    assert "week_rollover" in read.remarks
+
+
+def test_a_comma_between_date_and_time_in_quotes(write: Write) -> None:
+    at = write(
+        "a.csv", table("Date,lat,lon,mps\n", lambda t, n, e, d: f'"5/18/2024, {t:%I:%M:%S %p}",{n:.7f},{e:.7f},1\n')
+    )
+    profile, _text = drafted(at)
+    assert Read(at, profile).times("gnss")[0] == UTC

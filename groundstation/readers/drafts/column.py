@@ -25,6 +25,7 @@ class ColumnGuess:
     north: str = ""
     offset: float = 0.0
     is_pair: bool = False
+    is_variance: bool = False
 
     @property
     def line(self) -> str:
@@ -33,6 +34,7 @@ class ColumnGuess:
         sign = ", sign = -1" * (self.sign < 0)
         unit = f", unit = {quoted(self.unit)}" * bool(self.unit)
         offset = f", offset = {self.offset:.9g}" * bool(self.offset)
+        variance = ", variance = true" * self.is_variance
         north = f", north = {quoted(self.north)}" * bool(self.north)
         if self.is_pair:
             east = self.target.replace("latitude", "longitude")
@@ -41,7 +43,7 @@ class ColumnGuess:
                 for number, target in enumerate((self.target, east), start=1)
             )
             return f"{quoted(self.name)} = [{', '.join(parts)}]" + (f"  # {self.values}" if self.values else "")
-        entry = f"{quoted(self.name)} = {{ field = {quoted(self.target)}{unit}{scale}{sign}{offset}{north} }}"
+        entry = f"{quoted(self.name)} = {{ field = {quoted(self.target)}{unit}{scale}{sign}{offset}{north}{variance} }}"
         notes = "; ".join(filter(None, (self.values, self.why, f"? {self.doubt}" if self.doubt else "")))
         return f"{entry}  # {notes}" if notes else entry
 

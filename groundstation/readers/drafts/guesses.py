@@ -82,7 +82,14 @@ class Guesses:
         if not sample.is_of_numbers(at):
             cause = cause_of_numbers(sample.filled(at), sample.delimiter)
             return replace(left, doubt=f"looks like {meaning.target}, but has {cause}" if cause else "")
-        return replace(left, target=meaning.target, sign=meaning.sign, unit=meaning.unit, scale=meaning.scale)
+        return replace(
+            left,
+            target=meaning.target,
+            sign=meaning.sign,
+            unit=meaning.unit,
+            scale=meaning.scale,
+            is_variance=meaning.is_variance,
+        )
 
     def _drop_parts(self, found: dict[int, ColumnGuess]) -> None:
         """Drop axes of a sensor that lacks others, and a latitude or longitude alone."""
@@ -109,7 +116,7 @@ class Guesses:
             if north is not None and east is not None:
                 both = (in_unit(self._sample, north, east), in_unit(self._sample, east, north))
                 degrees = [degrees_of(self._sample, one) for one in both]
-                moved = motion_of(*degrees, self._time.seconds, sizes)
+                moved = motion_of(degrees[0], degrees[1], self._time.seconds, sizes)
                 mirrored = motion_of(degrees[0], -degrees[1], self._time.seconds, sizes)
                 if both[1].unit != "arcmin" or not self._is_followed(mirrored):
                     return moved

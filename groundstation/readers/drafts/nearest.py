@@ -45,13 +45,13 @@ def advice_on(source: Source, profiles: Iterable[Profile], page: str) -> Advice 
     draft = f"groundstation profile new {source.name}"
     if sample.header is None:
         return _without_names(sample, draft)
-    if len(known) < 2 and not near:
+    if len(known) < 2 and not near and len(sample.names) < _FEWEST_ROWS:
         return None
     found = f"a table that no profile claims (row {sample.header.number}: {_listed(sample.names)})"
     try:
         time = time_of(sample)
     except GroundstationError as error:
-        return Advice(f"{found}{near}; {error.found}", error.next_step)
+        return Advice(f"{found}{near}; {error.found}", error.next_step) if len(known) > 1 or near else None
     names = _canonical(sample, time)
     odd = [part for part in time.doubt.split("; ") if re.search("month|date", part)]
     near += "".join(f"; time: {part}" for part in odd)

@@ -250,8 +250,8 @@ def _header_above(rows: Sequence[Sequence[str]], first: int, cells: int) -> int 
 
 
 def _is_section(row: Sequence[str]) -> bool:
-    """Tell whether a line names a section: ``[data]``."""
-    return len(row) == 1 and bool(re.fullmatch(r"\[.*\]", row[0].strip()))
+    """Tell whether a line names a section, ``[data]``, or is a comment."""
+    return len(row) == 1 and bool(re.fullmatch(r"\[.*\]|#.*", row[0].strip()))
 
 
 def _known_names(row: Sequence[str]) -> int:
@@ -270,7 +270,11 @@ def _sample(
     else:
         first, *rest = _cells(header.text, shape.delimiter)
         names = (first.lstrip("# "), *rest)
-        rows = [split_cells(line.text, shape.delimiter) for line in lines[shape.header + 1 : shape.first_row]]  # type: ignore[operator]
+        between = lines[shape.header + 1 : shape.first_row]  # type: ignore[operator]
+        is_of_comments = all(
+            line.text.startswith("#") and len(_cells(line.text, shape.delimiter)) == 1 for line in between
+        )
+        rows = [] if is_of_comments else [split_cells(line.text, shape.delimiter) for line in between]
         behind = tuple(tuple(row[: len(names)] + [""] * (len(names) - len(row))) for row in rows)
     count = len(names)
     most = max(20, min(_MOST_ROWS, _MOST_CELLS // (count * (_WINDOWS + 1))))

@@ -122,7 +122,9 @@ def _of_week(sample: TableSample) -> Iterator[TimeGuess]:
             f"seconds = {quoted(sample.names[tow])}",
             f'unit = "{unit}"',
         )
-        doubt = "weeks below 1024 have rolled over: see earliest_year" if np.nanmax(weeks) < 1024 else ""
+        doubt = ""
+        if np.nanmax(weeks) < 1024:
+            lines, doubt = (*lines, "earliest_year = 2000"), "weeks below 1024 have rolled over: read as from 2000 on"
         yield TimeGuess((week, tow), lines, "GPS week and seconds of the week", seconds, True, doubt, 3)
 
 
@@ -335,7 +337,8 @@ def _of_numbers(sample: TableSample) -> Iterator[TimeGuess]:
         meaning = sample.meanings[at]
         if _is_clock(sample, at):
             continue
-        is_named = meaning is not None and meaning.role == "time"
+        is_of_week = meaning is not None and meaning.role == "tow"
+        is_named = is_of_week or (meaning is not None and meaning.role == "time")
         if meaning is not None and not is_named:
             continue
         values = sample.numbers(at)
@@ -359,6 +362,9 @@ def _of_numbers(sample: TableSample) -> Iterator[TimeGuess]:
         )
         if since and "gps" in name.lower() and unit == "s" and middle < 1.5e9:
             doubt = "seconds since 1970 assumed: GPS seconds count from 1980 and differ by leap seconds"
+        if is_of_week:
+            unit = (meaning.unit if meaning else "") or ("ms" if float(np.max(known)) > 2 * _WEEK_S else "s")
+            doubt = "seconds of the GPS week without the week: no absolute time"
         lines = (f'kind = "{"unix" if since else "seconds"}"', f"column = {quoted(name)}", f'unit = "{unit}"')
         rank = _rank(sample, at) + (bool(since) if is_named else -2)  # seconds since 1970 need no zone
         yield TimeGuess((at,), lines, why, values * SECONDS[unit], bool(since), doubt, rank)
