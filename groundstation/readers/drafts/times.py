@@ -116,7 +116,7 @@ def _of_week(sample: TableSample) -> Iterator[TimeGuess]:
     unit = "ms" if np.nanmax(seconds) > 2 * _WEEK_S else "s"
     seconds = seconds * SECONDS[unit] + weeks * _WEEK_S
     if _rises(seconds) and np.nanmax(seconds) > np.nanmin(seconds):
-        lines = (
+        lines: tuple[str, ...] = (
             'kind = "gps_week"',
             f"week = {quoted(sample.names[week])}",
             f"seconds = {quoted(sample.names[tow])}",
