@@ -95,7 +95,7 @@ def parted(text: Any, date_formats: tuple[str, ...]) -> tuple[Any, Any]:
     (['6/23/2021', 'later'], ['2:13:51 PM', 'later'])
     """
     blanks = date_formats[0].count(" ") if date_formats else 0
-    found = pc.extract_regex(text, rf"^(?P<date>\S+?(?: +\S+?){{{blanks}}}),?\x1f?(?:T|\s+)(?P<time>\d.*)$")
+    found = pc.extract_regex(text, rf"^(?P<date>\S+?(?: +\S+?){{{blanks}}})[.,]?\x1f?(?:T|\s+)(?P<time>\d.*)$")
     # A cell that is no date and time stays whole, to be counted as unreadable.
     date, time = (pc.struct_field(found, [at]) for at in (0, 1))
     return pc.coalesce(date, text), pc.coalesce(time, text)

@@ -233,7 +233,7 @@ def _times(name: str, text: Any, index: Int64Array, log: _Log) -> Column:
 
 def _read(name: str, column: str, text: Any, index: Int64Array, log: _Log) -> Column:
     """Return a column of numbers, or of text where its first cells are none."""
-    is_field = name == _FIXES and column in _FIELDS
+    is_field = column in _FIELDS if name == _FIXES else (name, column) == (_PRESSURES, "pressure")
     if not is_field and log.is_text.setdefault((name, column), not cells.are_numbers(text)):
         return _kept(cells.words(text), name, column, index, log)
     return _kept(cells.numbers(text), name, column, index, log)

@@ -40,20 +40,21 @@ def times_of(rule: TimeRule, texts: Sequence[Any], days: DayCount) -> tuple[Tabl
     if rule.kind == "utc_fraction":
         utc, zoneless = utc_of(texts[1:], rule.date_formats)
         return _added(cells.decimal_ns(texts[0], rule.digits, rule.multiple), utc), zoneless
+    if rule.kind == "local" and rule.columns[0] == rule.columns[1]:
+        texts = (*parted(texts[0], rule.date_formats), *texts[2:])
     return utc_of(texts, rule.date_formats)
 
 
 def utc_of(texts: Sequence[Any], date_formats: tuple[str, ...]) -> tuple[TableCells, int]:
     """Return UTC of one column (ISO 8601) or of date, time and offset.
 
-    Date and time may be the same column. Returns also the number of times without a zone.
+    Returns also the number of times without a zone.
     """
     if len(texts) == 1:
         read, zoneless = cells.iso_ns(texts[0])
         return read, int(zoneless.sum())
     offset = texts[2] if len(texts) > 2 else None
-    date, time = parted(texts[0], date_formats) if texts[0] is texts[1] else texts[:2]
-    read = local_ns(date, time, offset, date_formats)
+    read = local_ns(texts[0], texts[1], offset, date_formats)
     return read, 0 if offset is None else int(np.count_nonzero(read.column.mask & ~arrow.is_valid(offset)))
 
 

@@ -102,6 +102,12 @@ def test_damage_is_counted(tmp_path: Path) -> None:
     assert found.values("gnss", "latitude_deg") == [47.5, None, None, 47.5] and found.times("gnss")[3] is None
 
 
+def test_a_pressure_that_is_no_number_is_counted(tmp_path: Path) -> None:
+    found = read(tmp_path, TOP + SENSORS + "$DATA\n$BARO,1.0,10x325,20\n$BARO,1.1,101325,20\n$BARO,1.2,-5,20\n")
+    assert found.values("baro", "pressure_altitude_m") == pytest.approx([0.0], abs=0.01)
+    assert sum(one.count for one in found.damages if one.kind == "unreadable_cells") == 2
+
+
 def test_a_header_below_rows_governs_those_below_it(tmp_path: Path) -> None:
     other = "$COL,GNSS,time,lon,lat\n$GNSS,2024-05-06T10:00:01.000Z,8.5,48.5\n"
     found = read(tmp_path, TOP + FIXES + "$DATA\n" + FIX.format(0) + other)

@@ -69,9 +69,7 @@ class Fit:
 Scores = Callable[[Callable[[FloatArray], Model], FloatArray], Scored]
 
 
-def fit_model(
-    prior: Model, scored: Scores, numbers: tuple[Number, ...] = NUMBERS, begin: Model | None = None
-) -> Fit:
+def fit_model(prior: Model, scored: Scores, numbers: tuple[Number, ...] = NUMBERS, begin: Model | None = None) -> Fit:
     """Return the model of largest penalised likelihood near ``prior``.
 
     Parameters
@@ -95,9 +93,7 @@ def fit_model(
         count += 1
         found = scored(model_at, at)
         value = found.value if np.isfinite(found.value) else -1e300
-        return Scored(
-            float(value - 0.5 * np.sum((at / spread) ** 2)), found.gradient - at / spread**2, found.expected
-        )
+        return Scored(float(value - 0.5 * np.sum((at / spread) ** 2)), found.gradient - at / spread**2, found.expected)
 
     logs = np.zeros(len(numbers))
     if begin is not None:

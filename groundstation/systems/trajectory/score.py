@@ -171,5 +171,7 @@ def solved_with(
         K=np.empty((count, STATES)), y=np.empty(count), S=np.ones(count), mark=np.zeros(count, dtype=np.int8)
     )
     now, room = of.start.now(), make_room(of.start.prior)
-    value = filter_epochs(samples, plan, of.noise, gate, OWN_ESTIMATE, (0, end), now, room, known, solved, carries=False)
+    value = filter_epochs(
+        samples, plan, of.noise, gate, OWN_ESTIMATE, (0, end), now, room, known, solved, carries=False
+    )
     return value, solved
