@@ -20,6 +20,7 @@ from groundstation.base.garbage import importing
 from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.readers import csv_profile, profile_sources, registry
 from tests.browser import Browser, BrowserError, browser
 from tests.viewer_shots import NoViewerError, viewer
 
@@ -85,3 +86,20 @@ def finished_run(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Outc
         return pickle.loads(told.read_bytes())
 
     return run
+
+
+@pytest.fixture
+def own_profiles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The user's folder of profiles, empty."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    folder = tmp_path / "config/groundstation/profiles"
+    folder.mkdir(parents=True)
+    forget_profiles()
+    yield folder
+    forget_profiles()
+
+
+def forget_profiles() -> None:
+    """Forget the profiles that were loaded, as a new process does."""
+    for cached in (profile_sources.other_profiles, csv_profile.known_profiles, registry._plug_ins):
+        cached.cache_clear()

@@ -15,6 +15,7 @@ from groundstation.pipeline.many_flights.runs.strangers import MEMORY, Strangers
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.readers import registry
+from tests.conftest import forget_profiles
 
 CONTENTS = {
     "note.txt": b"notes of the day",
@@ -79,6 +80,17 @@ def test_another_version_looks_again(
     run(folder, tmp_path / "out")
     opened.clear()
     monkeypatch.setattr(strangers, "__version__", "0.0.1")
+    run(folder, tmp_path / "out")
+    assert len(opened) == len(CONTENTS)
+
+
+def test_a_new_profile_looks_again(folder: Path, tmp_path: Path, opened: list[Path], own_profiles: Path) -> None:
+    assert len(run(folder, tmp_path / "out")) == len(opened) == len(CONTENTS)
+    opened.clear()
+    (own_profiles / "mine.toml").write_text(
+        'name = "mine"\n[time]\nkind = "seconds"\ncolumn = "a"\n[columns]\nb = { field = "gnss.hdop" }\n'
+    )
+    forget_profiles()
     run(folder, tmp_path / "out")
     assert len(opened) == len(CONTENTS)
 

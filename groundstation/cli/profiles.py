@@ -46,6 +46,10 @@ def new(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Profile to write. Default: print it.", metavar="FILE")
     ] = None,
+    names: Annotated[
+        str | None,
+        typer.Option(help="Names of the columns of a table that has no row of names, with commas.", metavar="NAMES"),
+    ] = None,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -61,7 +65,7 @@ def new(
 
     if output is not None:
         require_place(table, output, force)
-    draft = new_profile(table)
+    draft = new_profile(table, tuple(name.strip() for name in names.split(",")) if names else ())
     if output is not None:
         write_profile(draft, output)
     if json:

@@ -34,6 +34,9 @@ _DMS = (
     r"(?P<minutes>\d{1,2}(?:\.\d*)?)(?:\s*[:'′m]\s*|\s+|$)"
     r"(?P<seconds>(?:\d{1,2}(?:\.\d*)?)?)\s*[\"″s]?\s*(?P<behind>[NSEWnsew]?)\s*$"
 )
+_SIDED = (
+    r"^\s*(?P<before>[NSEWnsew]?)\s*(?P<sign>[+-]?)\s*(?P<degrees>\d{1,3}(?:\.\d*)?)\s*°?\s*(?P<behind>[NSEWnsew]?)\s*$"
+)
 _SLASHED = re.compile(r"\d{4}[/.]\d{1,2}[/.]\d{1,2}\b")
 _TWO_SIGNS = r"^\+-"  # a Garmin G5 writes its plus in front of every number
 _NOT_TEXT = r"[\x00-\x08\x0a-\x1e\x7f\x{FFFD}]"
@@ -80,7 +83,8 @@ def part_of(text: Any, number: int) -> Any:
     >>> part_of(pa.array(["47.5 -8.25", "47.5", None]), 2).to_pylist()
     ['-8.25', None, None]
     """
-    words = pc.extract_regex(text, rf"^(?:\S+[ ,]+){{{number - 1}}}(?P<word>[^\s,]+)")
+    # \x1f stands for a delimiter that stood inside quotes
+    words = pc.extract_regex(text, rf"^(?:[^\s,;\x1f]+[\s,;\x1f]+){{{number - 1}}}(?P<word>[^\s,;\x1f]+)")
     return pc.struct_field(words, [0])
 
 
@@ -88,19 +92,22 @@ def degrees(text: Any, among_parts: bool = False) -> TableCells:
     """Convert degrees, minutes and seconds in one cell to degrees; plain degrees go through.
 
     The parts may be parted by blanks, colons or their signs; the seconds may be absent. A sign stands before, or a
-    letter N, S, E or W on either side. ``among_parts``: other cells of the column have minutes.
+    letter N, S, E or W on either side, of plain degrees too. ``among_parts``: other cells of the column have minutes.
 
     Examples
     --------
-    >>> read = degrees(pa.array(["-0 30 00", "47:12:36.0", "8 30.5 W", "12°30′18″S", "-8.5", "47 61 0"]))
+    >>> read = degrees(pa.array(["-0 30 00", "47:12:36.0", "8 30.5 W", "12°30′18″S", "-8.5", "47 61 0", "8.25W"]))
     >>> read.column.values.tolist(), read.unreadable.tolist()
-    ([-0.5, 47.21, -8.508333333333333, -12.505, -8.5, nan], [False, False, False, False, False, True])
+    ([-0.5, 47.21, -8.508333333333333, -12.505, -8.5, nan, -8.25], [False, False, False, False, False, True, False])
     """
     array, unreadable = _cast(text, pa.float64(), _NUMBER, is_sound=not among_parts)
     if not unreadable.any():
         return TableCells(_column(array, float("nan")), unreadable)
-    parts = pc.extract_regex(text, _DMS)
+    parts, plain_parts = pc.extract_regex(text, _DMS), pc.extract_regex(text, _SIDED)
     before, sign, whole, minutes, seconds, behind = (pc.struct_field(parts, [at]) for at in range(6))
+    before, sign, whole, behind = (
+        pc.coalesce(one, pc.struct_field(plain_parts, [at])) for at, one in enumerate((before, sign, whole, behind))
+    )
     found = arrow.is_valid(whole)
     values = [_part_values(one) for one in (whole, minutes, seconds)]
     found &= (values[1] < 60.0) & (values[2] < 60.0)
@@ -111,6 +118,27 @@ def degrees(text: Any, among_parts: bool = False) -> TableCells:
     values_deg = np.where(plain, arrow.values(array, float("nan")), np.where(is_minus, -size, size))
     present = plain | found
     return TableCells(Column(np.where(present, values_deg, np.nan), present), arrow.is_valid(text) & ~present)
+
+
+def degrees_and_minutes(text: Any) -> TableCells:
+    """Convert degrees and minutes that are run together, as receivers write them, to degrees.
+
+    A sign stands before, or a letter N, S, E or W behind.
+
+    Examples
+    --------
+    >>> read = degrees_and_minutes(pa.array(["4730.6", "-00815.0", "12215.6W", "4761.0", None]))
+    >>> read.column.values.tolist(), read.unreadable.tolist()
+    ([47.51, -8.25, -122.26, nan, nan], [False, False, False, True, False])
+    """
+    parts = pc.extract_regex(text, r"^\s*(?P<number>[+-]?\d+(?:\.\d*)?)\s*(?P<side>[NSEWnsew]?)\s*$")
+    read = numbers(pc.struct_field(parts, [0]))
+    is_minus = arrow.mask(pc.fill_null(pc.match_substring_regex(pc.struct_field(parts, [1]), "[SWsw]"), arrow.FALSE))
+    size = np.abs(read.column.values)
+    whole, minutes = np.divmod(size, 100.0)
+    present = read.column.mask & (minutes < 60.0)
+    values = np.copysign(whole + minutes / 60.0, read.column.values) * np.where(is_minus, -1.0, 1.0)
+    return TableCells(Column(np.where(present, values, np.nan), present), arrow.is_valid(text) & ~present)
 
 
 def _part_values(text: Any) -> NDArray[np.float64]:

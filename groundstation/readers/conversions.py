@@ -53,7 +53,9 @@ def read_cells(rule: LayoutRule, array: Any, layout: TableLayout, delimiter: str
     if rule.kind == "text":
         return cells.words(array, lambda word: restore_delimiters(word, delimiter)), "cells that are no text"
     what = "cells that are not a number"
-    if rule.form == "dms":
+    if rule.form == "ddmm":
+        read, what = cells.degrees_and_minutes(array), "cells that are not degrees and minutes, run together"
+    elif rule.form == "dms":
         read, what = cells.degrees(array), "cells that are not degrees, minutes and seconds"
     else:
         read = cells.numbers(array) if is_text else cells.ready_numbers(array)

@@ -17,7 +17,7 @@ from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.slips import slips
 from groundstation.readers.days import day_ns
-from groundstation.readers.dialect import Dialect, HeadLine, detect_encoding, head_lines
+from groundstation.readers.dialect import Dialect, HeadLine, detect_encoding, head_lines, split_cells
 from groundstation.readers.drafts.reasons import with_reasons
 from groundstation.readers.layout import TableLayout
 from groundstation.readers.losses import Losses
@@ -26,19 +26,20 @@ from groundstation.readers.profile import Profile
 from groundstation.readers.profile_file import load, shipped
 from groundstation.readers.profile_fit import Fit, delimiter_of, delimiters_of, fit_at, fit_below, joined_gaps
 from groundstation.readers.profile_layout import layout_of
-from groundstation.readers.profile_sources import other_profiles
+from groundstation.readers.profile_sources import READER, other_profiles
 from groundstation.readers.rtklib_tag import TaggedClock, clock_by_tag
 from groundstation.readers.sections import MOST, TableSection, header_places, left_out, lines_with, mark_of, told
 from groundstation.readers.source import Claim, Source
 from groundstation.readers.spaced import FixedSource, SpacedSource
 from groundstation.readers.start import unusable_references, utc_of_zero
 
-NAME = "csv-profile"
+NAME = READER
 DISTINCTIVE_COLUMNS = 4
 _HEAD_LINES = 1000
 DAMAGED_HEAD_LINES = 20  # lines searched for a header row when the first line is not the profile's
 MOST_LINES = 10_000  # lines searched for it otherwise
 _OF_NUMBERS = frozenset(b"%c" % sign for sign in b"0123456789+-.,;")
+_A_NUMBER = re.compile(r"\s*[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?\s*")
 _COMMENTS = re.compile(r"\A(?:#[^\n]*\n\s*)+")
 FEWEST_ROWS = 3  # above the header row that are those of another log
 
@@ -86,6 +87,7 @@ def _best(source: Source) -> tuple[float, Fit] | None:
         near = lines[:DAMAGED_HEAD_LINES]
         if is_near and not any(all(name in line.text for name in profile.required) for line in near):
             continue
+        profile = profile.for_file(source.name)
         seen = head_lines(_seen(source, profile), encoding, most) if profile.is_spaced else lines
         if not profile.first_lines:
             fit = _named_by(profile, encoding, seen)
@@ -268,19 +270,34 @@ def _joined(source: Source, fit: Fit) -> Fit:
 
 
 def _without_header(profile: Profile, encoding: str, lines: Sequence[HeadLine]) -> Fit | None:
-    """Match a profile to a file without a header, most of whose first lines are rows of it."""
-    at = next((place for place, line in enumerate(lines) if not line.text.startswith("#")), len(lines))
-    top = lines[at - 1] if at else HeadLine(0, 0, "", ended=True)
-    rows = tuple(line.text for line in lines[at : at + DAMAGED_HEAD_LINES] if line.text.strip())
+    """Match a profile to a file without a header, most of whose first lines are rows of it.
+
+    Text may stand above them; what looks like rows and does not fit is counted as lost.
+    """
     for delimiter in delimiters_of(profile):
+        top = HeadLine(0, 0, "", ended=True)
+        fit = Fit(profile, encoding, delimiter, profile.names, top)
+        at = next((place for place, line in enumerate(lines) if fit.is_row(line.text)), 0)
+        if all(_is_of_text(line.text, delimiter) for line in lines[:at]):
+            top = lines[at - 1] if at else top
+        else:
+            at = next((place for place, line in enumerate(lines) if not line.text.startswith("#")), len(lines))
+            top = lines[at - 1] if at else top
+        rows = tuple(line.text for line in lines[at : at + DAMAGED_HEAD_LINES] if line.text.strip())
         header = HeadLine(top.number, top.next_byte, "", ended=True)
-        fit = Fit(profile, encoding, delimiter, profile.names, header, above=tuple(lines[:at]), first_rows=rows)
+        fit = replace(fit, header=header, above=tuple(lines[:at]), first_rows=rows)
         if rows and 2 * sum(map(fit.is_row, rows)) >= len(rows):
             return fit
     return None
 
 
+def _is_of_text(line: str, delimiter: str) -> bool:
+    """Tell whether a line has no cell that is a number: it is no row that was torn."""
+    return line.startswith("#") or not any(_A_NUMBER.fullmatch(cell) for cell in split_cells(line, delimiter))
+
+
 def _fitted(source: Source, profile: Profile) -> Fit:
+    profile = profile.for_file(source.name)
     encoding = detect_encoding(source.head, source.name)
     if profile.names:
         found = _without_header(profile, encoding, head_lines(_seen(source, profile), encoding))

@@ -1,5 +1,6 @@
 """Conversion of local date, time and UTC offset in columns of text to UTC nanoseconds."""
 
+import re
 from typing import Any
 
 import numpy as np
@@ -11,16 +12,28 @@ from groundstation.base.units import NS_PER_S
 from groundstation.readers.cells import TableCells
 from groundstation.readers.days import day_ns
 
+_CLOCK = re.compile(
+    r"(?P<hour>\d\d?)(?P<sign>:?)(?P<minute>\d\d)(?:(?P=sign)(?P<second>\d\d)(?:[.,](?P<fraction>\d*))?)?"
+    r"(?:\s*(?P<half>[AaPp])\.?[Mm]\.?)?",
+    re.ASCII,
+)
+
 
 def _time_of_day_ns(text: str, formats: tuple[str, ...]) -> int | None:
-    whole, _, fraction = text.partition(".")
-    parts = whole.split(":")
-    if len(parts) != 3 or not all(part.isdecimal() for part in parts) or not (fraction or "0").isdecimal():
+    """Return the time since midnight of ``14:13:51.25``, ``2:13:51 PM`` or ``141351.25``."""
+    match = _CLOCK.fullmatch(text)
+    if match is None:
         return None
-    hour, minute, second = (int(part) for part in parts)
+    hour, minute, second = (int(part or 0) for part in match.group("hour", "minute", "second"))
+    if half := match["half"]:
+        if not 1 <= hour <= 12:
+            return None
+        hour = hour % 12 + (12 if half in "Pp" else 0)
+    elif match["second"] is None:  # 12:03 may be minutes and seconds
+        return None
     if hour > 23 or minute > 59 or second > 60:
         return None
-    return (hour * 3600 + minute * 60 + second) * NS_PER_S + int((fraction + "000000000")[:9])
+    return (hour * 3600 + minute * 60 + second) * NS_PER_S + int(((match["fraction"] or "") + "000000000")[:9])
 
 
 def _offset_ns(text: str, formats: tuple[str, ...]) -> int | None:
@@ -66,6 +79,26 @@ def local_ns(date: Any, time: Any, offset: Any | None, date_formats: tuple[str, 
         unreadable = unreadable | (bad_offset & has_day & has_time)
     present = has_day & has_time & ~unreadable
     return TableCells(Column(np.where(present, days + times - offsets, 0), present), unreadable)
+
+
+def parted(text: Any, date_formats: tuple[str, ...]) -> tuple[Any, Any]:
+    """Return the dates and the times of day of cells that have both.
+
+    A blank, a comma and a blank, or a T is between them; a date has as many blanks as its first format. A comma inside
+    quotes is seen as the sign for it.
+
+    Examples
+    --------
+    >>> import pyarrow as pa
+    >>> date, time = parted(pa.array(["6/23/2021, 2:13:51 PM", "later"]), ("%m/%d/%Y",))
+    >>> date.to_pylist(), time.to_pylist()
+    (['6/23/2021', 'later'], ['2:13:51 PM', 'later'])
+    """
+    blanks = date_formats[0].count(" ") if date_formats else 0
+    found = pc.extract_regex(text, rf"^(?P<date>\S+?(?: +\S+?){{{blanks}}})[.,]?\x1f?(?:T|\s+)(?P<time>\d.*)$")
+    # A cell that is no date and time stays whole, to be counted as unreadable.
+    date, time = (pc.struct_field(found, [at]) for at in (0, 1))
+    return pc.coalesce(date, text), pc.coalesce(time, text)
 
 
 def time_of_day_ns(text: Any) -> TableCells:

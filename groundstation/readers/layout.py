@@ -17,7 +17,7 @@ RuleKind = Literal["double", "bool", "text", "raw"]
 TimeKind = Literal[
     "seconds", "nanoseconds", "iso", "local", "unix", "gps_week", "time_of_day", "utc_counter", "utc_fraction"
 ]
-Form = Literal["", "dms", "variance"]
+Form = Literal["", "dms", "ddmm", "variance"]
 Key: TypeAlias = tuple[str, str]  # topic, field
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ class LayoutRule:
     @property
     def is_parsed(self) -> bool:
         """Tell whether its cells are numbers that the CSV parser itself converts."""
-        return self.kind == "double" and self.form != "dms" and not self.values and not self.part
+        return self.kind == "double" and self.form not in ("dms", "ddmm") and not self.values and not self.part
 
     @property
     def key(self) -> Key:

@@ -6,7 +6,7 @@ docs/profiles.md describes every key of the TOML files that ``profile_file`` rea
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -130,7 +130,14 @@ class Profile:
     derived: tuple[DerivedRule, ...] = ()
     constants: Mapping[str, str] = field(default_factory=dict)
     find: Mapping[str, re.Pattern[str]] = field(default_factory=dict)
+    find_in_name: Mapping[str, re.Pattern[str]] = field(default_factory=dict)
     join: Mapping[str, str] = field(default_factory=dict)
+
+    def for_file(self, name: str) -> "Profile":
+        """Return the profile with the metadata that the name of a file tells."""
+        matches = {key: pattern.search(name) for key, pattern in self.find_in_name.items()}
+        told = {key: " ".join((match[1] or "").split()) for key, match in matches.items() if match}
+        return replace(self, constants={**self.constants, **told}) if told else self
 
     @property
     def is_spaced(self) -> bool:

@@ -1,16 +1,17 @@
 """Columns of a profile, and the fields that they feed or that are derived from them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
 from groundstation.base.signals import field_of
-from groundstation.readers.layout import METHODS, Key
+from groundstation.readers.layout import METHODS, Form, Key
 from groundstation.readers.profile import ColumnRule, DerivedRule, InputRule, Variation
 from groundstation.readers.profile_values import Checker
 from groundstation.readers.told import HPA_PER_INHG
 
 DIRECTIONS = ("track_deg", "true_heading_deg")  # directions of which a profile may state the north
+_ANGLES: Mapping[str, Form] = {"dms": "dms", "ddmm": "ddmm"}  # units that are written in a form of their own
 _OF_CELLS = ("values", "variance", "missing", "part")
 
 
@@ -39,10 +40,10 @@ class ColumnChecker(Checker):
             other = feeding.get(target)
             if other is not None and not (is_optional and other.is_optional):
                 self.fail(f"{key}.field", target, f"a field that {other.name!r} does not feed already")
-            is_dms = table.get("unit") == "dms" and known.unit == "deg"
-            table |= {"unit": "deg"} if is_dms else {}
+            form = _ANGLES.get(str(table.get("unit")), "") if known.unit == "deg" else ""
+            table |= {"unit": "deg"} if form else {}
             rule = replace(self.column(name, key, topic, known, table), north=north, is_optional=is_optional)
-            rule = self.with_cells(replace(rule, form="dms" if is_dms else ""), of_cells, key, missing)
+            rule = self.with_cells(replace(rule, form=form), of_cells, key, missing)
             feeding.setdefault(target, rule)
             rules.append(rule)
         return tuple(rules)

@@ -72,16 +72,14 @@ class _ProfileChecker(Checker):
         missing = of_columns.missing(table.get("missing", []), "missing")
         columns = of_columns.columns(table["columns"], missing)
         key = self.table(table.get("key", {}), "key", ("column", "only"), ("column",) if "key" in table else ())
-        metadata = self.table(table.get("metadata", {}), "metadata", ("find", "join", "set"))
-        find, constants, join = (
-            self.table(metadata.get(name, {}), f"metadata.{name}", ()) for name in ("find", "set", "join")
-        )
-        find = {key: self.pattern(value, f"metadata.find.{key}") for key, value in find.items()}
+        metadata = self.table(table.get("metadata", {}), "metadata", ("find", "find_in_name", "join", "set"))
+        constants, join = (self.table(metadata.get(name, {}), f"metadata.{name}", ()) for name in ("set", "join"))
+        find, find_in_name = (self.patterns(metadata, name) for name in ("find", "find_in_name"))
         constants = {key: self.text(value, f"metadata.set.{key}") for key, value in constants.items()}
-        known = find.keys() | constants.keys()
+        known = find.keys() | find_in_name.keys() | constants.keys()
         names = self.texts(recognise["names"], "recognise.names") if "names" in recognise else ()
         if time.date and time.date not in known:
-            self.fail("time.date", repr(time.date), "a name of metadata.find or metadata.set")
+            self.fail("time.date", repr(time.date), "a name of metadata.find, find_in_name or set")
         if names and not {*(rule.name for rule in columns), *time.columns} <= set(names):
             self.fail("recognise.names", ", ".join(names), "every column that the profile names")
         rows_after = self.number(recognise.get("rows_after_header", 0), "recognise.rows_after_header")
@@ -111,6 +109,7 @@ class _ProfileChecker(Checker):
             derived=of_columns.derivations(table.get("derived", []), columns, raw_topic),
             constants=constants,
             find=find,
+            find_in_name=find_in_name,
             join={key: self.template(value, key, known) for key, value in join.items()},
         )
 
@@ -134,6 +133,11 @@ class _ProfileChecker(Checker):
         if any(width != int(width) or not 1 <= width <= MOST_WIDTHS for width in found):
             self.fail("recognise.widths", repr(value)[:40], f"whole numbers from 1 to {MOST_WIDTHS}")
         return tuple(map(int, found))
+
+    def patterns(self, metadata: Mapping[str, Any], name: str) -> dict[str, re.Pattern[str]]:
+        """Return the regular expressions of a table of the metadata."""
+        table = self.table(metadata.get(name, {}), f"metadata.{name}", ())
+        return {key: self.pattern(value, f"metadata.{name}.{key}") for key, value in table.items()}
 
     def pattern(self, value: Any, key: str) -> re.Pattern[str]:
         try:

@@ -23,7 +23,7 @@ from groundstation.readers.told import ColumnFacts, bare, told
 
 _MOST_ABOVE = 20  # lines above a header in the middle of a file that belong to it
 _TIMES: Mapping[str, re.Pattern[str]] = {
-    "local": re.compile(r"\d{1,2}:\d\d:\d\d(\.\d*)?"),
+    "local": re.compile(r"(.*[T\s])?(\d{1,2}:\d\d(:\d\d([.,]\d*)?)?(\s*[AaPp]\.?[Mm]\.?)?|\d{6}([.,]\d*)?)"),
     "iso": re.compile(r"\d{4}[-/.]?\d\d?.*"),
     "seconds": re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?"),
     "nanoseconds": re.compile(r"[+-]?\d+"),
@@ -90,7 +90,8 @@ class Fit:
             if match:
                 found[key] = " ".join((match.group(1) or "").split())
         for key, template in self.profile.join.items():
-            names = {name: found.get(name, "") for name in (*self.profile.find, *self.profile.constants)}
+            told = (*self.profile.find, *self.profile.find_in_name, *self.profile.constants)
+            names = {name: found.get(name, "") for name in told}
             found[key] = " ".join(template.format(**names).split())
         units = units_entry(self.units)
         return found | {PREFIX + self.profile.raw_topic: units} if units else found

@@ -5,6 +5,7 @@ several of them, or a module beside which they are, by an entry point of the gro
 that cannot be used is a line, and hides no other.
 """
 
+import hashlib
 import os
 import sys
 from collections.abc import Iterable, Iterator
@@ -19,6 +20,7 @@ from groundstation.readers.profile import Profile
 from groundstation.readers.profile_file import load
 
 ENTRY_POINT_GROUP = "groundstation.profiles"
+READER = "csv-profile"  # that of all profiles; its title has the profile's name behind
 MOST_FILES = 1000  # of one folder
 
 
@@ -54,6 +56,24 @@ def other_profiles() -> OtherProfiles:
 
     failures += load_plug_ins(ENTRY_POINT_GROUP, "profile", take)
     return OtherProfiles(tuple(found.values()), tuple(failures))
+
+
+def path_of_profile(reader: str) -> Path | None:
+    """Return the file of another's profile by the title of its claim; None of a shipped one."""
+    name = reader.removeprefix(f"{READER} ")
+    found = other_profiles().profiles if name != reader else ()
+    return next((profile.path for profile in found if profile.name == name), None)
+
+
+def contents() -> tuple[str, ...]:
+    """Return a digest of each profile of others: another content may claim other files."""
+    digests = []
+    for profile in other_profiles().profiles:
+        try:
+            digests.append(hashlib.sha256(profile.path.read_bytes()).hexdigest())
+        except OSError:
+            digests.append("")
+    return tuple(digests)
 
 
 def _taken(path: Path, found: dict[str, Profile]) -> str:

@@ -59,9 +59,11 @@ class TimeChecker(Checker):
         return TimeColumns("utc_counter", names, self.time_unit(table), self.date_formats(table))
 
     def local_time(self, table: dict[str, Any]) -> TimeColumns:
-        self.table(table, "time", ("kind", "date", "time", "offset", "date_formats"), ("date", "time"))
+        """Return the columns of date and time of day, which may be one, and of the offset."""
+        needed = ("column",) if "column" in table else ("date", "time")
+        self.table(table, "time", ("kind", *needed, "offset", "date_formats"), needed)
         is_utc = table.get("offset") == "UTC"
-        keys = [key for key in ("date", "time", "offset") if key in table and not (key == "offset" and is_utc)]
+        keys = [*(needed * 2)[:2], *(["offset"] if "offset" in table and not is_utc else [])]
         names = [self.text(table[key], f"time.{key}") for key in keys]
         return TimeColumns("local", tuple(names), date_formats=self.date_formats(table), is_utc=is_utc)
 

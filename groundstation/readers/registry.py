@@ -24,6 +24,7 @@ from groundstation.readers import (
     dataflash,
     flat_csv,
     flightdata_hdf5,
+    flysight2,
     igc,
     magic,
     receiver,
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
 
 ENTRY_POINT_GROUP = "groundstation.readers"
 FLAT_CSV = f"the flat CSV ({flat_csv.PAGE})"
-_OF_TEXT: tuple[Reader, ...] = (csv_profile, flat_csv, rtklib_pos)
+_OF_TEXT: tuple[Reader, ...] = (flysight2, csv_profile, flat_csv, rtklib_pos)
 _BUILT_IN: tuple[Reader, ...] = (
     *(chapter10, dataflash, ulog, flightdata_hdf5, receiver, sbet, bags, tlog, igc),
     *_OF_TEXT,

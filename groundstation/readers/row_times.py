@@ -11,7 +11,7 @@ from groundstation.base.timescales import gps_week_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.readers import cells
 from groundstation.readers.cells import TableCells
-from groundstation.readers.dates import local_ns, time_of_day_ns
+from groundstation.readers.dates import local_ns, parted, time_of_day_ns
 from groundstation.readers.days import DayCount
 from groundstation.readers.layout import TimeRule
 
@@ -40,6 +40,8 @@ def times_of(rule: TimeRule, texts: Sequence[Any], days: DayCount) -> tuple[Tabl
     if rule.kind == "utc_fraction":
         utc, zoneless = utc_of(texts[1:], rule.date_formats)
         return _added(cells.decimal_ns(texts[0], rule.digits, rule.multiple), utc), zoneless
+    if rule.kind == "local" and rule.columns[0] == rule.columns[1]:
+        texts = (*parted(texts[0], rule.date_formats), *texts[2:])
     return utc_of(texts, rule.date_formats)
 
 

@@ -14,7 +14,7 @@ HPA_PER_INHG = 33.8638866667
 _MPS_PER_MPH = 0.44704
 _SPELLED: Mapping[str, str] = MappingProxyType(
     {
-        "deg": "deg degs degree degrees degt degm °",
+        "deg": "deg degs degree degrees degt degm ° @",  # @: the sign of OpenTX
         "rad": "rad radian radians",
         "ft": "ft feet foot",
         "m": "m mt meter meters metre metres",
@@ -25,7 +25,7 @@ _SPELLED: Mapping[str, str] = MappingProxyType(
         "kmh": "km/h kph kmh",
         "mph": "mph",
         "fpm": "fpm ft/min",
-        "fps": "fps ft/s ft/sec",
+        "fps": "fps ft/s ft/sec f/s",
         "dps": "deg/s deg/sec dps",
         "radps": "rad/s rad/sec",
         "mps2": "m/s2 m/s^2 m/s/s",
@@ -34,6 +34,8 @@ _SPELLED: Mapping[str, str] = MappingProxyType(
         "hpa": "hpa mb mbar",
         "fsd": "fsd",
         "mhz": "mhz",
+        "a": "a amp amps",
+        "ma": "ma",
     }
 )
 _UNITS = {**CONVERSIONS, "mph": ("mps", _MPS_PER_MPH), "inhg": ("inhg", 1.0), "hpa": ("inhg", 1.0 / HPA_PER_INHG)}

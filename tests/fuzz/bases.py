@@ -295,6 +295,22 @@ def igc() -> bytes:
     return (head + "".join(rows) + "E100000PEV\r\n").encode()
 
 
+def flysight2() -> bytes:
+    """Fixes and sensors of a FlySight 2 in one file."""
+    head = (
+        "$FLYS,1\n$VAR,DEVICE_ID,abc\n$COL,GNSS,time,lat,lon,hMSL,velN,velE,velD,hAcc,vAcc,sAcc,numSV\n"
+        "$UNIT,GNSS,,deg,deg,m,m/s,m/s,m/s,m,m,m/s,\n$COL,BARO,time,pressure,temperature\n"
+        "$COL,IMU,time,wx,wy,wz,ax,ay,az,temperature\n$COL,TIME,time,tow,week\n$DATA\n"
+    )
+    rows = (
+        f"$GNSS,2024-05-06T10:{k // 60:02d}:{k % 60:02d}.200Z,47.{k:07d},-122.25,100.5,3.0,4.0,-2.0,1.5,2.5,0.2,9\n"
+        f"$IMU,{500 + k}.000,1.5,-2,0,0,0,1.0,25.5\n$BARO,{500 + k}.050,101325.00,20.5\n"
+        f"$TIME,{500 + k}.100,{122418 + k}.100,2313\n"
+        for k in range(100)
+    )
+    return (head + "".join(rows)).encode()
+
+
 _STARTS: dict[str, Callable[[bytes], Iterator[int]]] = {
     "flat-csv": line_starts,
     "csv-profile": line_starts,
@@ -318,6 +334,7 @@ _STARTS: dict[str, Callable[[bytes], Iterator[int]]] = {
     "sbet": lambda data: iter(range(0, len(data), 136)),
     "tlog": lambda data: iter(range(0, len(data), 48)),
     "hdf5": hdf5_starts,
+    "flysight2": line_starts,  # last: the place of a format is part of its seeds
 }
 FORMATS = tuple(_STARTS)
 _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
@@ -329,6 +346,7 @@ _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
     "csv-profile": (g1000,),
     "tables": (waypoint, states, skyview, radio),
     "igc": (igc,),
+    "flysight2": (flysight2,),
     "ulog": (ulog,),
     "dataflash": (dataflash,),
     "chapter10": (chapter10,),

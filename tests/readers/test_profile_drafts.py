@@ -12,10 +12,14 @@ from typer.testing import CliRunner
 
 from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
 from groundstation.cli.main import app
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.log import open_log
+from groundstation.pipeline.one_flight.resume import Keys, keys_of
 from groundstation.pipeline.verbs.profiles import findings_of, new_profile, try_profile
 from groundstation.readers import csv_profile, profile_sources, registry
 from groundstation.readers.drafts.words import meaning_of
 from groundstation.readers.profile_file import load
+from tests.conftest import forget_profiles
 from tests.readers.test_flat_csv import Read
 
 RADIUS_M, SPEED_MPS, LATITUDE_DEG = 100.0, 10.0, 50.0
@@ -215,8 +219,6 @@ def test_names_and_what_they_mean(name: str, target: str, unit: str) -> None:
 
 CAUSES = {
     "minutes and seconds alone": "time,lat,lon\n12:03.5,1.5,2\n12:03.6,1.5,2\n12:03.7,1.5,2\n",
-    "US dates (month/day/year)": "time,lat,lon\n6/23/2021 2:13:51 PM,1.5,2\n6/23/2021 2:13:52 PM,1.5,2\n",
-    "day and month cannot be told apart": "time,lat,lon\n5/6/2021 2:13:51,1.5,2\n5/6/2021 2:13:52,1.5,2\n",
     "a decimal comma in quotes": 'time,lat,lon\n"1,5","55,1","37,1"\n"2,5","55,1","37,1"\n',
 }
 
@@ -231,6 +233,21 @@ def test_errors_name_the_cause(write: Write, cause: str) -> None:
     assert cause in told and told.count(cause) == (3 if "quotes" in cause else 1)
     code, _, err = groundstation("profile", "check", str(profile), str(table))
     assert code in (1, 3) and err.count("\n") <= 1
+
+
+US = "time,lat,lon\n" + "".join(f"{{0}}/{{1}}/2021 2:13:{s} PM,55.{s},37.5\n" for s in range(50, 60))
+
+
+def test_us_dates_are_told_and_read_by_the_draft(write: Write) -> None:
+    table = write("a.csv", US.format(6, 23))
+    profile, text = drafted(table)
+    assert 'date_formats = ["%m/%d/%Y"]' in text and "month before day, as in the US" in text
+    assert Read(table, profile).times("gnss")[0] == 1_624_457_630_000_000_000  # 2021-06-23T14:13:50Z
+    with pytest.raises(UnclaimedLogError, match="time: month before day, as in the US"):
+        registry.identify(table)
+    by_another = " ".join(one.text for one in findings_of(try_profile(write("p.toml", PROFILE), table)))
+    assert "US dates (month/day/year), such as '6/23/2021 2:13:50 PM'" in by_another
+    assert "day and month cannot be told apart" in " ".join(new_profile(write("b.csv", US.format(5, 6))).doubts)
 
 
 @pytest.mark.parametrize("coding", ["utf-16", "utf-16-le"])
@@ -302,20 +319,6 @@ def test_the_nearest_profile_and_what_is_missing_are_told(write: Write) -> None:
         registry.identify(table)
 
 
-@pytest.fixture
-def own_profiles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """The user's folder of profiles, empty."""
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
-    caches = (profile_sources.other_profiles, csv_profile.known_profiles, registry._plug_ins)
-    folder = tmp_path / "config/groundstation/profiles"
-    folder.mkdir(parents=True)
-    for one in caches:
-        one.cache_clear()
-    yield folder
-    for one in caches:
-        one.cache_clear()
-
-
 def test_a_profile_in_the_users_folder_is_found_by_the_header(own_profiles: Path, write: Write) -> None:
     (own_profiles / "mine.toml").write_text(PROFILE.replace("Hdg", "Heading").replace('"p"', '"mine"'))
     (own_profiles / "bad.toml").write_text("name = 1")
@@ -329,6 +332,31 @@ def test_a_profile_in_the_users_folder_is_found_by_the_header(own_profiles: Path
     other = write("b.csv", TABLE.replace("Heading", "Head"))
     with pytest.raises(UnclaimedLogError, match="nearest is profile mine: it lacks Heading"):
         registry.identify(other)
+
+
+def test_what_a_profile_of_the_user_says_is_part_of_the_key_of_a_run(own_profiles: Path, write: Write) -> None:
+    """A run that is continued after the profile was changed makes the results anew."""
+    table, text = write("a.csv", TABLE), PROFILE.replace("Hdg", "Heading").replace('"p"', '"mine"')
+
+    def keys() -> Keys:
+        forget_profiles()
+        return keys_of(open_log(table).source, Configuration())
+
+    (own_profiles / "mine.toml").write_text(text)
+    first = keys()
+    (own_profiles / "other.toml").write_text(PROFILE.replace("Hdg", "Foo").replace('"p"', '"other"'))
+    assert keys() == first  # nothing that the log was read by
+    (own_profiles / "mine.toml").write_text(text.replace("ins.true_heading_deg", "ins.magnetic_heading_deg"))
+    assert keys().conversion != first.conversion
+    (own_profiles / "mine.toml").unlink()
+    with pytest.raises(UnclaimedLogError):
+        keys()
+
+
+def test_a_shipped_profile_asked_for_by_its_name_has_a_key(write: Write) -> None:
+    table = write("track.txt", "1714989600.0 0 0 0 0 0 0 1\n1714989600.1 1 0 0 0 0 0 1\n")
+    source = open_log(table, Path("tum")).source
+    assert keys_of(source, Configuration(profile="tum")) != keys_of(source, Configuration(profile="kitti-oxts"))
 
 
 def test_a_profile_of_a_plug_in_is_found(own_profiles: Path, write: Write, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -59,6 +59,11 @@ EDGETX = (
     "Date,Time,1RSS(dB),RQly(%),GPS,GSpd(kmh),Hdg(°),Alt(m),Sats,Curr(A),Rud,Ele,Thr,Ail,SA,LSW,CH1(us),TxBat(V)\n"
     "2024-05-06,10:00:00.000,-70,100,47.500000 -122.250000,36.0,90,20,12,5.5,0,0,-1024,0,-1,0x0,1500,7.9\n"
 )
+OPENTX = (
+    "Date,Time,GPS,GSpd(f/s),Hdg(@),Curr(mA),Sei,H\u00f6h,Gas,Que,SA,LSW,TxBat(V)\n"
+    "2024-05-06,10:00:00.000,47.500000 -122.250000,100.0,90,550,0,0,-1024,0,-1,0x0,7.9\n"
+    "2024-05-06,10:00:00.100,,100.0,90,550,0,0,-1024,0,-1,0x0,7.9\n"
+)
 KITTI = (
     "2024-05-06 10:00:00.000000000 49.0 8.4 116.5 0.1 0.05 0.5235987755982988 3 4 5 0 0.5 0.1 0.2 9.8 0.1 0.2 9.8 "
     "0.01 0.02 0.03 0.01 0.02 0.03 0.1 0.05 4 8 4 4 0\n"
@@ -146,6 +151,16 @@ CASES = (
             "gnss.satellites_used": 12.0,
             "electric.current_a": 5.5,
             "raw.edgetx.Alt(m)": 20.0,
+        },
+    ),
+    Case(
+        "edgetx",
+        OPENTX,
+        {
+            "gnss.longitude_deg": -122.25,
+            "gnss.ground_speed_mps": 30.48,
+            "gnss.track_deg": 90.0,
+            "electric.current_a": 0.55,
         },
     ),
     Case(

@@ -27,6 +27,8 @@ from groundstation.pipeline.one_flight.configuration import ISOLATION, Configura
 from groundstation.pipeline.one_flight.identity import plain_id
 from groundstation.pipeline.one_flight.log import as_log, digest_of
 from groundstation.pipeline.one_flight.sealing import spoiled_files
+from groundstation.readers.profile_file import known_as
+from groundstation.readers.profile_sources import path_of_profile
 from groundstation.reports.flight_report import PDF, REPORT
 from groundstation.results.document import SummaryDocument
 from groundstation.results.file_names import ARRAYS, SUMMARY, TABLES
@@ -172,8 +174,9 @@ def keys_of(source: Source, configuration: Configuration, *, digests: Sequence[s
     tables = dict(configuration.tables)
     thresholds = tables.pop("thresholds", {})
     tables.pop(ISOLATION, None)
+    layouts = layouts_of(source, configuration)
     conversion = digest_of_parts(
-        *(asdict(source), _layouts_of(configuration), thresholds, dict(versions()), platform.python_version()),
+        *(asdict(source), layouts, thresholds, dict(versions()), platform.python_version()),
         *([list(digests)] if len(digests) > 1 else []),
     )
     intervals = [[asdict(part) for part in listed] for listed in (configuration.exclude, configuration.force)]
@@ -189,12 +192,15 @@ def digest_of_parts(*parts: Any) -> str:
     return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
 
 
-def _layouts_of(configuration: Configuration) -> list[str]:
+def layouts_of(source: Source, configuration: Configuration) -> list[str]:
     """Return the content of profile, ICDs and references; the name of a shipped ICD.
 
-    Whether a reference is expected counts: without one of its time a log is then refused, else it is run.
+    The profile is the one that is given, or another's that was found for the log. Whether a reference is expected
+    counts: without one of its time a log is then refused, else it is run.
     """
-    profile = [_content_of(configuration.profile, "a profile")] if configuration.profile else []
+    given = configuration.profile_path
+    used = path_of_profile(source.reader) if given is None else known_as(given)
+    profile = [] if used is None else [_content_of(str(used), "a profile")]
     icds = [_content_of(one, "an ICD") if Path(one).is_file() else one for one in configuration.icds]
     references = [_content_of(str(path), "a reference") for path in configuration.references.paths]
     return [

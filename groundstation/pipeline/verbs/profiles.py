@@ -1,6 +1,6 @@
 """Verbs of ``profile``: profiles written for a table and tried on it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,8 +27,8 @@ class KnownProfile:
     origin: str
 
 
-def new_profile(table: Path) -> Draft:
-    """Return the draft of a profile for a table.
+def new_profile(table: Path, names: Sequence[str] = ()) -> Draft:
+    """Return the draft of a profile for a table, with names for one that has none.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def new_profile(table: Path) -> Draft:
     UnreadableLogError
         When it is no table, or has no time that can be read.
     """
-    return draft_of(Source(_file(table)))
+    return draft_of(Source(_file(table)), names)
 
 
 def write_profile(draft: Draft, path: Path) -> None:

@@ -14,7 +14,7 @@ _DMS = re.compile(
     r"[NSEWnsew+-]?\s*\d{1,3}\s*[°:d ]\s*\d{1,2}(?:\.\d*)?\s*"
     r"(?:['′:m ]\s*(?:\d{1,2}(?:\.\d*)?\s*[\"″s]?)?)?\s*[NSEWnsew]?"
 )
-_SIDE = re.compile(r"[NSEWnsew]\s*\d+(?:\.\d*)?|\d+(?:\.\d*)?\s*°?\s*[NSEWnsew]")
+_SIDE = re.compile(r"[NSEWnsew]\s*\d{1,3}(?:\.\d*)?|\d{1,3}(?:\.\d*)?\s*°?\s*[NSEWnsew]")
 _WITH_UNIT = re.compile(r"[+-]?\d+(?:\.\d*)?\s*[A-Za-z°%/²]+[A-Za-z0-9/^²]*")
 MISSING = frozenset(
     ("n/a", "na", "null", "none", "nil", "-", "--", "---", "*", "?", "inv", "invalid", "no data", "#n/a")
@@ -39,14 +39,17 @@ def date_order(cells: Sequence[str]) -> str:
 
 
 def are_angles(cells: Sequence[str]) -> bool:
-    """Tell whether cells are degrees, minutes and seconds.
+    """Tell whether cells are degrees, minutes and seconds, or degrees with a letter.
 
     Examples
     --------
-    >>> are_angles(["47:12:36.0", "12°30′18″S"]), are_angles(["47.5"])
-    (True, False)
+    >>> are_angles(["47:12:36.0", "12°30′18″S"]), are_angles(["47.5"]), are_angles(["047.123450N"])
+    (True, False, True)
     """
-    return bool(cells) and all(_DMS.fullmatch(cell.strip()) and not _NUMBER.fullmatch(cell) for cell in cells)
+    plain = [cell.strip() for cell in cells]
+    return bool(plain) and all(
+        (_DMS.fullmatch(cell) or _SIDE.fullmatch(cell)) and not _NUMBER.fullmatch(cell) for cell in plain
+    )
 
 
 def cause_of_times(cells: Sequence[str]) -> str:

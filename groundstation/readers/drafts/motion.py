@@ -46,6 +46,21 @@ class Motion:
         off = float(middle / _SPEEDS[unit] - 1.0)
         return (unit, off) if abs(off) < _NEAR else None
 
+    def turn_dps(self, seconds: FloatArray) -> float | None:
+        """Return the median rate of turn, degrees per second; None where nothing shows it.
+
+        Parameters
+        ----------
+        seconds : ndarray, shape (n,)
+            Times of the rows of the table.
+        """
+        if len(self.rows) < _FEWEST:
+            return None
+        steps_s = np.diff(seconds[self.rows])
+        turns = np.abs(wrap_180(np.diff(self.direction_deg)))
+        use = (steps_s > 0.0) & (steps_s < _MOST_S) & (turns < 90.0)
+        return float(np.median(turns[use] / steps_s[use])) if np.count_nonzero(use) >= _FEWEST else None
+
     def is_followed(self, values_deg: FloatArray) -> bool:
         """Tell whether a direction is that of the motion nearly always."""
         there = values_deg[self.rows]

@@ -1,5 +1,6 @@
 """Advice on a table that no profile claims: the nearest, what it lacks, its names."""
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -12,6 +13,7 @@ from groundstation.readers.source import Source
 
 FEWEST_SHARED, LEAST_SHARE = 4, 0.5  # columns, one fewer of others' profiles, and their share of those of the profile
 MOST_NAMED = 8
+_FEWEST_ROWS = 3  # and columns, of a table without names
 _MOST_SEARCHED = 500  # names among which a similar one is looked for
 
 
@@ -40,16 +42,30 @@ def advice_on(source: Source, profiles: Iterable[Profile], page: str) -> Advice 
         return None
     known = [one for one in sample.meanings if one is not None]
     near = _nearest(sample, profiles)
-    if sample.header is None or (len(known) < 2 and not near):
+    draft = f"groundstation profile new {source.name}"
+    if sample.header is None:
+        return _without_names(sample, draft)
+    if len(known) < 2 and not near and len(sample.names) < _FEWEST_ROWS:
         return None
     found = f"a table that no profile claims (row {sample.header.number}: {_listed(sample.names)})"
-    draft = f"groundstation profile new {source.name}"
     try:
         time = time_of(sample)
     except GroundstationError as error:
-        return Advice(f"{found}{near}; {error.found}", error.next_step)
+        return Advice(f"{found}{near}; {error.found}", error.next_step) if len(known) > 1 or near else None
     names = _canonical(sample, time)
+    odd = [part for part in time.doubt.split("; ") if re.search("month|date", part)]
+    near += "".join(f"; time: {part}" for part in odd)
     return Advice(found + near, f"name them {', '.join(names)} ({page}), or: {draft}" if names else draft)
+
+
+def _without_names(sample: TableSample, draft: str) -> Advice | None:
+    """Return advice on a table without a row of names; None where its rows are few."""
+    rows, count = sum(map(len, sample.blocks)), len(sample.names)
+    if rows < _FEWEST_ROWS or count < _FEWEST_ROWS:
+        return None
+    parted = "blanks" if sample.is_spaced else f"{sample.delimiter!r}"
+    found = f"a table without a row of names ({count} columns parted by {parted}, the first row: "
+    return Advice(f"{found}{_listed(sample.blocks[0][0])})", draft)
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -3,7 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,7 +25,10 @@ from groundstation.readers.source import Source
 from groundstation.readers.spaced import SpacedSource
 
 _NUMBER = re.compile(r"[+-]{0,2}(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?|nan|NaN|NAN|[+-]?inf")
-_TIME = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}.*|\d{1,2}:\d\d(?::\d\d)?(?:[.,]\d*)?(?: ?[AaPp][Mm])?")
+_TIME = re.compile(
+    r"\d{1,2}-[A-Za-z]{3}-\d{4}.*|\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}.*|\d{1,2}:\d\d(?::\d\d)?(?:[.,]\d*)?(?: ?[AaPp][Mm])?"
+)
+_NINES = re.compile(r"-?9{3,}(?:\.(?:0*|9*))?")  # 9999, -999.0: no value, where all others are far from it
 _FIRST_LINES, _MOST_BEHIND = 2000, 10
 _WINDOWS, _WINDOW_BYTES = 8, 32 << 10  # later pieces of the file that are looked at
 _MOST_ROWS = 1000  # of each piece
@@ -50,6 +53,10 @@ class TableSample:
         Rows that follow one another, piece by piece; each has as many cells as there are names.
     is_spaced : bool
         Blanks part the cells; they are seen as tabs.
+    above : tuple of str
+        Lines above the header and the rows.
+    are_given : bool
+        The user gave the names of a table that has none.
     """
 
     name: str
@@ -60,6 +67,8 @@ class TableSample:
     behind: tuple[tuple[str, ...], ...]
     blocks: tuple[tuple[tuple[str, ...], ...], ...]
     is_spaced: bool = False
+    above: tuple[str, ...] = ()
+    are_given: bool = False
     _numbers: dict[int, FloatArray] = field(default_factory=dict)
 
     @cached_property
@@ -76,17 +85,23 @@ class TableSample:
     @cached_property
     def meanings(self) -> tuple[Meaning | None, ...]:
         """Meaning of each column by its name and the rows of units."""
-        if self.header is None:
+        if self.header is None and not self.are_given:
             return (None,) * len(self.names)
         return tuple(
             meaning_of(name, tuple(row[at] for row in self.behind if row[at])) for at, name in enumerate(self.names)
         )
 
     def numbers(self, at: int) -> FloatArray:
-        """Return a column as numbers; NaN where a cell is none."""
+        """Return a column as numbers; NaN where a cell is none, or a sign for that."""
         if at not in self._numbers:
-            self._numbers[at] = np.array([self.number(cell) for cell in self.columns[at]], dtype=np.float64)
+            signs, values = self.signs(at), self._plain_numbers(at)
+            if any(_NINES.fullmatch(sign) for sign in signs):
+                values[[cell in signs for cell in self.columns[at]]] = np.nan
+            self._numbers[at] = values
         return self._numbers[at]
+
+    def _plain_numbers(self, at: int) -> FloatArray:
+        return np.array([self.number(cell) for cell in self.columns[at]], dtype=np.float64)
 
     def number(self, cell: str) -> float:
         """Return a cell as a number, NaN where it is none."""
@@ -100,11 +115,21 @@ class TableSample:
 
     def filled(self, at: int) -> list[str]:
         """Return the cells of a column that are neither empty nor a sign for that."""
-        return [cell for cell in self.columns[at] if cell and cell.lower() not in MISSING]
+        signs = self.signs(at)
+        return [cell for cell in self.columns[at] if cell and cell not in signs]
 
     def signs(self, at: int) -> set[str]:
-        """Return the signs for missing values in a column."""
-        return {cell for cell in self.columns[at] if cell.lower() in MISSING}
+        """Return the signs for missing values: words, and nines that are far from all others."""
+        words = {cell for cell in self.columns[at] if cell.lower() in MISSING}
+        nines = {cell for cell in self.columns[at] if _NINES.fullmatch(cell)}
+        if not nines:
+            return words
+        values, odd = self._plain_numbers(at), np.array([self.number(cell) for cell in sorted(nines)])
+        known = values[np.isfinite(values) & ~np.isin(values, odd)]
+        far = 10.0 * float(np.max(np.abs(known), initial=1.0))
+        is_far = len(known) > 0 and bool(np.all(np.abs(odd) > min(far, 900.0)) and np.max(np.abs(known)) < 900.0)
+        is_far |= len(known) > 0 and bool(np.all(np.abs(odd) > far))
+        return words | nines if is_far else words
 
     def is_of_numbers(self, at: int) -> bool:
         """Tell whether a column is one of numbers."""
@@ -120,14 +145,28 @@ class TableSample:
             start += len(block)
 
 
-def sample_of(source: Source) -> TableSample:
-    """Return a sample of a table.
+def sample_of(source: Source, names: Sequence[str] = ()) -> TableSample:
+    """Return a sample of a table, with names for one that has none.
 
     Raises
     ------
     UnreadableLogError
-        When the file is empty, no text, or holds no table.
+        When the file is empty, no text, or holds no table, or has names of its own beside those given.
     """
+    sample = _sampled(source)
+    if not names:
+        return sample
+    if sample.header is not None:
+        raise UnreadableLogError(
+            source.name, f"names of its own in row {sample.header.number}", "a table without a row of names"
+        )
+    if len(names) != len(sample.names) or len(set(names)) != len(names):
+        expected = f"{len(sample.names)} names, one for each column, all different"
+        raise UnreadableLogError(source.name, f"{len(names)} names", expected)
+    return replace(sample, names=tuple(names), are_given=True)
+
+
+def _sampled(source: Source) -> TableSample:
     if source.is_empty:
         raise UnreadableLogError(source.name, "an empty file", "a table", "check how it was copied")
     encoding = detect_encoding(source.head, source.name)
@@ -173,7 +212,7 @@ class _Shape:
 
     @classmethod
     def of(cls, lines: Sequence[HeadLine], delimiter: str) -> "_Shape | None":
-        rows = [split_cells(line.text, delimiter) for line in lines[:300]]
+        rows = [_cells(line.text, delimiter) for line in lines[:300]]
         counts = Counter(len(row) for row in rows if len(row) > 1)
         if not counts:
             return None
@@ -184,6 +223,11 @@ class _Shape:
         if first is not None and header is None:  # rows that end with a delimiter that the header lacks
             header = _header_above(rows, first, cells - 1) if cells > 2 and not rows[first][-1] else None
         return cls(delimiter, cells, share, header, first)
+
+
+def _cells(line: str, delimiter: str) -> list[str]:
+    """Return the cells of a line, without the sign of a comment before names with blanks."""
+    return split_cells(line.lstrip("# \t") if delimiter == "\t" and line.startswith("#") else line, delimiter)
 
 
 def _is_row(cells: Sequence[str]) -> bool:
@@ -198,11 +242,16 @@ def _header_above(rows: Sequence[Sequence[str]], first: int, cells: int) -> int 
         row = rows[at]
         if len(row) == cells and any(row) and not _is_row(row):
             places.append(at)
-        elif any(row):
+        elif any(row) and not _is_section(row):
             break
     if not places:
         return None
     return max(places, key=lambda at: (_known_names(rows[at]), len(set(filter(None, rows[at]))) > cells // 2, -at))
+
+
+def _is_section(row: Sequence[str]) -> bool:
+    """Tell whether a line names a section, ``[data]``, or is a comment."""
+    return len(row) == 1 and bool(re.fullmatch(r"\[.*\]|#.*", row[0].strip()))
 
 
 def _known_names(row: Sequence[str]) -> int:
@@ -219,9 +268,13 @@ def _sample(
     if header is None:
         names = tuple(f"column_{at + 1}" for at in range(shape.cells))
     else:
-        first, *rest = split_cells(header.text, shape.delimiter)
+        first, *rest = _cells(header.text, shape.delimiter)
         names = (first.lstrip("# "), *rest)
-        rows = [split_cells(line.text, shape.delimiter) for line in lines[shape.header + 1 : shape.first_row]]  # type: ignore[operator]
+        between = lines[shape.header + 1 : shape.first_row]  # type: ignore[operator]
+        is_of_comments = all(
+            line.text.startswith("#") and len(_cells(line.text, shape.delimiter)) == 1 for line in between
+        )
+        rows = [] if is_of_comments else [split_cells(line.text, shape.delimiter) for line in between]
         behind = tuple(tuple(row[: len(names)] + [""] * (len(names) - len(row))) for row in rows)
     count = len(names)
     most = max(20, min(_MOST_ROWS, _MOST_CELLS // (count * (_WINDOWS + 1))))
@@ -230,7 +283,9 @@ def _sample(
     kept = tuple(block for block in blocks if block)
     if not kept:
         raise UnreadableLogError(source.name, "names but no rows below", "a header and rows")
-    return TableSample(source.name, encoding, shape.delimiter, header, names, behind, kept, is_spaced)
+    top = shape.first_row if shape.header is None else shape.header
+    above = tuple(line.text for line in lines[:top])
+    return TableSample(source.name, encoding, shape.delimiter, header, names, behind, kept, is_spaced, above)
 
 
 def _rows(texts: Iterator[str] | Sequence[str], delimiter: str, count: int, most: int) -> Iterator[tuple[str, ...]]:

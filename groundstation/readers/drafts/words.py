@@ -5,12 +5,13 @@ The words are those of public logs of drones, gliders, boats, cars and phones, i
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from types import MappingProxyType
 
 _IN_BRACKETS = re.compile(r"\(([^()]*)\)|\[([^\[\]]*)\]|\{([^{}]*)\}")
 _CAMEL = re.compile(r"(?<=[a-zа-я0-9])(?=[A-ZА-Я])|(?<=[A-Z])(?=[A-Z][a-z])")
+_SQUARED = re.compile(r"([a-zA-Z]+)(?:\^?2|²)")  # m^2
 _PARTING = re.compile(r"[^0-9A-Za-zА-Яа-яёЁ]+")
 MOST_CHARACTERS = 80  # of a name: a longer one is no name of a quantity
 _GNSS = frozenset(["gps", "gnss", "ubx", "rtk", "nmea", "ublox", "receiver"])
@@ -110,7 +111,8 @@ class Meaning:
     """Meaning of a name: the topic and field it feeds, and its sign.
 
     ``topic`` is that of a name which does not say GNSS or INS. ``unit`` and ``scale`` are those that the name tells.
-    ``role`` is ``time``, ``date``, ``clock``, ``week``, ``tow``, ``variation``, ``key`` or empty for a field.
+    ``is_variance``: the number is a square. ``role`` is ``time``, ``date``, ``clock``, ``week``, ``tow``,
+    ``variation``, ``key`` or empty for a field.
     """
 
     topic: str = ""
@@ -119,6 +121,7 @@ class Meaning:
     role: str = ""
     unit: str = ""
     scale: float = 1.0
+    is_variance: bool = False
 
     @property
     def target(self) -> str:
@@ -131,8 +134,8 @@ _BODY = {"x": "forward", "y": "right", "z": "down"}
 _BY_ANGLE = {"roll": "x", "pitch": "y", "yaw": "z"}
 # (pattern of the words, topic, field, unit kind, sign)
 _FIELDS: tuple[tuple[str, str, str, str, int], ...] = (
-    (r"lat|latitude|широта", "gnss", "latitude_deg", "deg", 1),
-    (r"lon|lng|long|longitude|longtitude|долгота", "gnss", "longitude_deg", "deg", 1),
+    (r"(?:lat|latitude)(?: n s)?|широта", "gnss", "latitude_deg", "deg", 1),
+    (r"(?:lon|lng|long|longitude|longtitude)(?: e w)?|долгота", "gnss", "longitude_deg", "deg", 1),
     (
         rf"{_ALTITUDE}(?: (?:above )?(?:ellipsoid|ellipsoidal|hae|wgs84|wgs))|hae|h ell|h ellipsoid"
         rf"|(?:ellipsoid|ellipsoidal|wgs84|hae) {_ALTITUDE}",
@@ -163,7 +166,7 @@ _FIELDS: tuple[tuple[str, str, str, str, int], ...] = (
         *("gnss", "ground_speed_mps", "mps", 1),
     ),
     (
-        r"(?:true )?(?:track|course|trk|crs|cog|bearing|ground course|ground track|g course)"
+        r"(?:true )?(?:track|course|trk|crs|cog|bearing|direction|ground course|ground track|g course)"
         r"(?: (?:angle|true|over ground|made good))?|cog true|truetrack|путевой угол|heading motion|heading of motion",
         *("gnss", "track_deg", "deg", 1),
     ),
@@ -219,6 +222,12 @@ _FIELDS: tuple[tuple[str, str, str, str, int], ...] = (
     (r"weight on wheels|wow|on ground|onground", "discrete", "weight_on_wheels", "", 1),
     (r"(?:battery |batt? )?(?:current|curr|amps?)", "electric", "current_a", "a", 1),
 )
+_SQUARE = r"(?:cov|covariance|var|variance)(?: pos| position)?"
+_SIGMAS: tuple[tuple[str, str, str], ...] = (
+    ("n|north|lat|latitude|nn|n n", "position_north_sigma_m", "m"),
+    ("e|east|lon|longitude|ee|e e", "position_east_sigma_m", "m"),
+    ("u|up|d|down|h|height|alt|altitude|uu|u u|dd|d d", "vertical_sigma_m", "m"),
+)
 # Three axes of one sensor: (pattern with the axis as group, topic, field with the axis in braces, kind)
 _TRIADS: tuple[tuple[str, str, str, str], ...] = (
     (
@@ -228,7 +237,8 @@ _TRIADS: tuple[tuple[str, str, str, str], ...] = (
         *("imu", "rate_{}_dps", "dps"),
     ),
     (
-        r"(?:acc|accel|acceleration|accelerometer|a|f|specific force) ?([xyz])|([xyz]) ?(?:acc|accel|acceleration)",
+        r"(?:acc|accel|acceleration|accelerometer|a|f|specific force|g ?force) ?([xyz])"
+        r"|([xyz]) ?(?:acc|accel|acceleration)",
         "imu",
         "accel_{}_mps2",
         "mps2",
@@ -246,7 +256,7 @@ _ROLES: tuple[tuple[str, str], ...] = (
         r"|update|since)? ?"
         r"(?:time|timestamp|time stamp|date ?time|epoch|t|ts)(?: (?:s|us|usec|utc|boot|unix|stamp|since .*"
         r"|from .*|elapsed"
-        r"|of (?:day|fix)|pc))?|unix|utc|seconds|millis|millisecond|timeusec|seconds elapsed|время"
+        r"|of (?:day|fix)|pc|fine))?|unix|utc|seconds|millis|millisecond|timeusec|seconds elapsed|время"
         r"|date time .*|timestamp .*"
         r"|isodatetime|iso ?8601|base date time|(?:date ?time|time) ?utc|elapsed",
         "time",
@@ -259,6 +269,11 @@ _ROLES: tuple[tuple[str, str], ...] = (
     (r"icao ?24|mmsi|callsign|tail(?: number)?|vehicle(?: id)?|id|uas id|registration|icao", "key"),
 )
 _COMPILED = tuple((re.compile(pattern), topic, field, kind, sign) for pattern, topic, field, kind, sign in _FIELDS)
+_COMPILED_SIGMAS = tuple(
+    (re.compile(f"{what} ?(?:{axes})|(?:{axes}) ?{what}"), field, kind, is_variance)
+    for what, is_variance in ((_SIGMA, False), (_SQUARE, True))
+    for axes, field, kind in _SIGMAS
+)
 _COMPILED_TRIADS = tuple((re.compile(pattern), topic, field, kind) for pattern, topic, field, kind in _TRIADS)
 _COMPILED_ROLES = tuple((re.compile(pattern), role) for pattern, role in _ROLES)
 
@@ -333,7 +348,10 @@ def meaning_of(name: str, units: tuple[str, ...] = ()) -> Meaning | None:
             if topic in ("gnss", "ins"):
                 topic = "gnss" if is_gnss and not is_ins else "ins" if is_ins and not is_gnss else topic
                 topic = topic if _has(topic, found.field) else found.topic
-            return Meaning(topic, found.field, found.sign, found.role, found.unit, found.scale)
+            field = found.field
+            if (topic, field) == ("ins", "true_heading_deg") and is_gnss and not is_ins:
+                topic, field = "gnss", "track_deg"  # what a receiver calls its heading
+            return replace(found, topic=topic, field=field)
     return None
 
 
@@ -350,6 +368,10 @@ def _meaning(words: list[str], said: tuple[str, ...]) -> Meaning | None:
         for pattern, topic, field, kind, sign in _COMPILED:
             if pattern.fullmatch(text) and (found := _with_unit(kind, said, tail)) is not None:
                 return Meaning(topic, field, sign, "", *found)
+        for pattern, field, kind, is_variance in _COMPILED_SIGMAS:
+            units = tuple(_SQUARED.sub(r"\1", text) for text in said) if is_variance else said
+            if pattern.fullmatch(text) and (found := _with_unit(kind, units, tail)) is not None:
+                return Meaning("gnss", field, 1, "", *found, is_variance=is_variance)
         for pattern, topic, field, kind in _COMPILED_TRIADS:
             match = pattern.fullmatch(text)
             if match and (found := _with_unit(kind, said, tail)) is not None:

@@ -14,6 +14,7 @@ from pathlib import Path
 from groundstation.base.version import __version__
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.readers import registry
+from groundstation.readers.profile_sources import contents
 from groundstation.results.files import write_bytes
 
 MEMORY = ".strangers.json"  # in OUT
@@ -86,8 +87,8 @@ def _stamp(path: Path) -> Stamp:
 
 
 def _key() -> list[str]:
-    """Key of the memory: another version or another reader may claim a file."""
-    return [__version__, *(one.name for one in registry.formats()), *registry.plug_in_failures()]
+    """Key of the memory: another version, reader or profile may claim a file."""
+    return [__version__, *(one.name for one in registry.formats()), *registry.plug_in_failures(), *contents()]
 
 
 def _encoded(found: Mapping[str, tuple[Stamp, str]]) -> bytes:

@@ -16,7 +16,7 @@ from groundstation.pipeline.one_flight.configuration import Configuration, read_
 from groundstation.pipeline.one_flight.flight import report_files
 from groundstation.pipeline.one_flight.log import Log
 from groundstation.pipeline.one_flight.outcome import Outcome
-from groundstation.pipeline.one_flight.resume import TO_DO, Step, digest_of_parts, versions
+from groundstation.pipeline.one_flight.resume import TO_DO, Step, digest_of_parts, layouts_of, versions
 from groundstation.pipeline.one_flight.sealing import spoiled_files
 from groundstation.reports.flight_report import PDF, REPORT
 from groundstation.results.files import load_document, load_manifest
@@ -82,9 +82,8 @@ class SessionJob:
         tables = dict(self.configuration.tables)
         thresholds = tables.get("thresholds", {})
         used = {name: tables.get(name, {}) for name in session_tables()}
-        conversion = digest_of_parts(
-            logs, thresholds, self.configuration.profile, dict(versions()), platform.python_version()
-        )
+        layouts = [layouts_of(log.source, self.configuration) for log in self.logs]
+        conversion = digest_of_parts(logs, thresholds, layouts, dict(versions()), platform.python_version())
         analysis = digest_of_parts(conversion, asdict(self.stations), used, [asdict(note) for note in self.notes])
         return Keys(conversion, analysis)
 

@@ -1,0 +1,53 @@
+"""Guess of what a column of a table becomes, as a line of a draft."""
+
+from dataclasses import dataclass
+
+from groundstation.base.toml_text import quoted
+
+
+@dataclass(frozen=True)
+class ColumnGuess:
+    """One column: what it becomes, and why.
+
+    ``target`` is empty where it is left; ``doubt`` is what the user has to look at. ``is_pair``: latitude and longitude
+    stand in each cell, and ``target`` is the latitude.
+    """
+
+    at: int
+    name: str
+    target: str = ""
+    unit: str = ""
+    scale: float = 1.0
+    sign: int = 1
+    values: str = ""
+    why: str = ""
+    doubt: str = ""
+    north: str = ""
+    offset: float = 0.0
+    is_pair: bool = False
+    is_variance: bool = False
+
+    @property
+    def line(self) -> str:
+        """The line of the draft."""
+        scale = f", scale = {self.scale:g}" * (self.scale != 1.0)
+        sign = ", sign = -1" * (self.sign < 0)
+        unit = f", unit = {quoted(self.unit)}" * bool(self.unit)
+        offset = f", offset = {self.offset:.9g}" * bool(self.offset)
+        variance = ", variance = true" * self.is_variance
+        north = f", north = {quoted(self.north)}" * bool(self.north)
+        if self.is_pair:
+            east = self.target.replace("latitude", "longitude")
+            parts = (
+                f"{{ field = {quoted(target)}, unit = {quoted(self.unit)}, part = {number} }}"
+                for number, target in enumerate((self.target, east), start=1)
+            )
+            return f"{quoted(self.name)} = [{', '.join(parts)}]" + (f"  # {self.values}" if self.values else "")
+        entry = f"{quoted(self.name)} = {{ field = {quoted(self.target)}{unit}{scale}{sign}{offset}{north}{variance} }}"
+        notes = "; ".join(filter(None, (self.values, self.why, f"? {self.doubt}" if self.doubt else "")))
+        return f"{entry}  # {notes}" if notes else entry
+
+
+def both(guess: ColumnGuess, doubt: str) -> str:
+    """Return the doubt of a guess with one more."""
+    return f"{guess.doubt}; {doubt}" if guess.doubt else doubt
