@@ -107,6 +107,14 @@ def ground() -> FlightResults:
 
 
 @cache
+def flux() -> FlightResults:
+    """A compass that gives heading alone, on eight legs."""
+    from tests.systems.magnetic.test_flux import whole
+
+    return whole()
+
+
+@cache
 def landing() -> FlightResults:
     """Approaches by an ILS, the threshold given; its receiver tells protection levels."""
     from tests.systems.landing.test_tab import results
@@ -288,6 +296,7 @@ CASES: dict[str, Callable[[], FlightResults]] = {
     "joined": joined,
     "magnetic": magnetic,
     "ground": ground,
+    "flux": flux,
     "landing": landing,
     "landing_without_site": landing_without_site,
     "beacons": beacons,

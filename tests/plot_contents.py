@@ -35,7 +35,19 @@ Contents = dict[str, dict[str, list[str]]]  # lines by plot and panel
 KEPT = Path(__file__).parent / "references" / "plots.json"
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 RUN = ("taxi-good", "taxi-short")  # logs that the suite runs anyway
-SAVED = ("report", "aided", "magnetic", "ground", "landing", "beacons", "control", "placement", "session", "trajectory")
+SAVED = (
+    "report",
+    "aided",
+    "magnetic",
+    "ground",
+    "flux",
+    "landing",
+    "beacons",
+    "control",
+    "placement",
+    "session",
+    "trajectory",
+)
 ALIKE = 1e-4  # of the greatest number in the brackets: what another machine may come to
 MOST_STATES = 8
 BRACKETS = re.compile(r"\[([^\[\]]*)\]")

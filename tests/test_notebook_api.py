@@ -42,6 +42,7 @@ NAMES = (
     "inertial inertial-tilt inertial-radial inertial-innovations inertial-observability inertial-differences "
     "inertial-own-innovations landing-beacons landing-space landing-accuracy landing-trials latency-search together "
     "magnetic-deviation magnetic-held-out magnetic-track magnetic-branches magnetic-modulus magnetic-ground "
+    "magnetic-flux-legs magnetic-flux-turns "
     "landing-deviations landing-final landing-motion landing-protection map profile attitude states gaps reference "
     "reference-track reference-claims cooperative-map cooperative-errors cooperative-geometry cooperative-links "
     "control-paths control-measures control-law placement-map placement-accuracy "

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from groundstation.base.findings import Finding
+from groundstation.base.findings import Finding, Severity
 from groundstation.base.signals import topics_of_kind
 from groundstation.methods.roles import HeadingOnGround
 from groundstation.results.answer import Answers, answer_of
@@ -12,11 +12,14 @@ from groundstation.systems.analysis import Analysis, Found, Rules, Shortfall, ma
 from groundstation.systems.known import Known
 from groundstation.systems.magnetic.answer import MagneticResult
 from groundstation.systems.magnetic.columns import COLUMNS
+from groundstation.systems.magnetic.flux_answer import FluxDeviation
+from groundstation.systems.magnetic.flux_settings import FLUX_LIMITS, MagneticFluxSettings
 from groundstation.systems.magnetic.ground_answer import GroundDeviation
 from groundstation.systems.magnetic.ground_settings import MagneticGroundSettings
 from groundstation.systems.magnetic.settings import LIMITS, MagneticSettings
 
 if TYPE_CHECKING:
+    from groundstation.systems.magnetic.flux_reference import OtherAnswers
     from groundstation.tables.table import Flight
 
 SURE_SIGMAS = 2.0
@@ -112,6 +115,57 @@ def _has_magnetic_heading(flight: "Flight", _known: Known) -> bool:
     return any(flight[topic].has("magnetic_heading_deg") for topic in topics_of_kind("ins", flight.topics()))
 
 
+def _run_flux(flight: "Flight", known: Known, settings: MagneticFluxSettings) -> Found[FluxDeviation]:
+    from groundstation.systems.magnetic.flux_estimate import estimate_flux_deviation
+
+    found = estimate_flux_deviation(
+        flight,
+        settings=settings,
+        magnetic=known.settings_of(MagneticSettings),
+        phases=known.phases,
+        others=_others(known),
+    )
+    severity: Severity = "warn" if found.verdict == "reject" else "info"
+    text = f"flux valve in flight: {found.verdict}: {found.verdict_reason}"
+    return Found(found, (Finding(severity, f"magnetic_flux.{found.verdict}", text, found.ins_topic),))
+
+
+def _others(known: Known) -> "OtherAnswers":
+    from groundstation.systems.magnetic.flux_reference import OtherAnswers
+
+    known_ins = known.answer_meeting(KindOfIns)
+    return OtherAnswers(
+        states=known.answer_meeting(StatesAlongTheFlight),
+        heading=known.answer_meeting(HeadingByTrack),
+        by_turns=known.answer_meeting(AzimuthByTurns),
+        kinds=known_ins.kinds if known_ins else {},
+        aircraft=known.aircraft,
+    )
+
+
+def _examine_flux(flight: "Flight", known: Known, settings: MagneticFluxSettings) -> tuple[Shortfall, ...]:
+    from groundstation.systems.magnetic.examine_flux import examine_flux
+
+    return examine_flux(flight, known, settings)
+
+
+def _rejudge_flux(answer: FluxDeviation, settings: MagneticFluxSettings) -> tuple[Rejudged, ...]:
+    from groundstation.systems.magnetic.flux_verdict import flux_rejudge
+
+    return flux_rejudge(answer, settings)
+
+
+def _flux_sentence(answers: Answers) -> str:
+    found = answer_of(answers, FluxDeviation)
+    if found is None:
+        return ""
+    given = [row.letter for row in found.coefficients if row.value_deg is not None]
+    legs = _count(len(found.used), "straight leg")
+    text = f"flux valve {found.verdict}: {', '.join(given) or 'no coefficient'} of A to E by {legs}"
+    residual = found.residual_rms_deg
+    return text if residual is None else f"{text}, {residual.before:.2f} deg RMS before, {residual.after:.2f} after"
+
+
 def _ground_sentence(answers: Answers) -> str:
     found = answer_of(answers, GroundDeviation)
     return "" if found is None else _ground_text(found)
@@ -153,4 +207,22 @@ MAGNETIC_GROUND = Analysis(
     builds_on=("latency",),
     is_expected=_has_magnetic_heading,
     sentence=_ground_sentence,
+)
+MAGNETIC_FLUX = Analysis(
+    name="magnetic_flux",
+    title="deviation of a flux valve (heading alone) from straight legs and turns in flight",
+    subject="flux valve in flight",
+    page_title="Flux valve in flight",
+    needs="ins magnetic heading of a compass, a date and positions; a true heading with no compass in it, or GNSS "
+    "velocities and air true_airspeed on several headings",
+    settings=MagneticFluxSettings,
+    answer=FluxDeviation,
+    run=_run_flux,
+    builds_on=("heading", "inertial", "trajectory"),
+    applies=_has_magnetic_heading,
+    is_expected=_has_magnetic_heading,
+    sentence=_flux_sentence,
+    examine=_examine_flux,
+    rules=Rules(FLUX_LIMITS, _rejudge_flux),
+    is_main=main_numbers("verdict"),
 )

@@ -21,8 +21,10 @@ from groundstation.systems.magnetic.arrays import CorrectedHeadingRows
 from groundstation.systems.magnetic.deviation_answer import (
     Deviation,
     deviation_of,
+    flux_deviation_of,
 )
 from groundstation.systems.magnetic.deviation_to_apply import Apply, asked_for
+from groundstation.systems.magnetic.flux_answer import FluxDeviation
 from groundstation.systems.magnetic.settings import MagneticSettings
 from groundstation.tables.table import Flight
 
@@ -72,6 +74,9 @@ def apply_deviation(flight: Flight, results: FlightResults, asked: Apply, known:
     if deviation.verdict == "reject":
         why = f" ({deviation.verdict_reason})" if deviation.verdict_reason else ""
         return _not_applied(results, f"{whose} is rejected{why}", "warn")
+    if deviation.is_of_heading and deviation.verdict != "accept":
+        why = f" ({deviation.verdict_reason})" if deviation.verdict_reason else ""
+        return _not_applied(results, f"{whose} is {deviation.verdict}{why}", "info")
     try:
         corrected = correct_heading(
             flight, deviation, settings=known.settings_of(MagneticSettings), latencies=results.answer_meeting(Delays)
@@ -88,8 +93,11 @@ def apply_deviation(flight: Flight, results: FlightResults, asked: Apply, known:
 
 
 def _own(results: FlightResults) -> Deviation | None:
-    found = results.answer(MagneticResult)
-    return deviation_of(found, results.flight_id, results.metadata.get("aircraft", "")) if found else None
+    found, by_heading = results.answer(MagneticResult), results.answer(FluxDeviation)
+    whose = results.flight_id, results.metadata.get("aircraft", "")
+    if found is None and by_heading is not None:
+        return flux_deviation_of(by_heading, *whose)
+    return deviation_of(found, *whose) if found else None
 
 
 def _not_applied(results: FlightResults, reason: str, severity: Severity) -> AppliedDeviation:
@@ -103,7 +111,7 @@ def _told(corrected: "CorrectedHeading", deviation: Deviation, whose: str) -> Fi
     how = {"iron": "its iron", "table": "its table", "coefficients": "its coefficients A to E"}[corrected.way]
     parts = [f"{whose} ({deviation.method}, {deviation.verdict}) applied to {corrected.topic} by {how}"]
     parts.append(f"{len(corrected)} headings")
-    if kind_of(corrected.topic) == "ins" and deviation.magnetometer_topic:
+    if kind_of(corrected.topic) == "ins" and deviation.magnetometer_topic and not deviation.is_of_heading:
         parts.append(f"it was found for {deviation.magnetometer_topic}: correct only if that is the same sensor")
     if corrected.lacks_current:
         parts.append("it depends on a current that this log lacks: that of its figures is assumed")

@@ -104,6 +104,31 @@ class GroundRunCurve(Arrays, figure="magnetic_ground_curve", digits=_FOUR):
     heading_error_sigma_deg: Floats
 
 
+class FluxEpochRows(Arrays, figure="magnetic_flux_epochs", digits={"*": 3}):
+    """Epochs in the air: heading as read, its error, lean in turns, error by lean as fitted.
+
+    ``leg`` counts from 1, 0 in none.
+    """
+
+    time_s: Floats
+    leg: Counts
+    magnetic_heading_deg: Floats
+    heading_error_deg: Floats
+    lean_deg: Floats
+    bank_error_deg: Floats
+
+
+class FluxCurve(Arrays, figure="magnetic_flux_curve", digits=_FOUR):
+    """Error of a heading sensor in flight, fitted, with its sigma, and what is to be added."""
+
+    uncorrected_magnetic_heading_deg: Floats
+    heading_error_deg: Floats
+    heading_error_sigma_deg: Floats
+    deviation_to_add_deg: Floats
+    deviation_sigma_deg: Floats
+    is_interpolated: Flags
+
+
 class CorrectedHeadingRows(Arrays, figure="corrected_heading", digits=_FOUR):
     """Magnetic heading with a deviation table applied."""
 

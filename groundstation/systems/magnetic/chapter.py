@@ -38,6 +38,13 @@ from groundstation.systems.magnetic.answer import (
     PoissonParameters,
     Vector,
 )
+from groundstation.systems.magnetic.flux_chapter import (
+    FLUX_LEAD,
+    FLUX_TITLE,
+    flux_claim,
+    flux_parts,
+    flux_workings,
+)
 from groundstation.systems.magnetic.ground_chapter import LEAD as GROUND_LEAD
 from groundstation.systems.magnetic.ground_chapter import TITLE as GROUND_TITLE
 from groundstation.systems.magnetic.ground_chapter import ground_claim, ground_runs, ground_workings
@@ -91,11 +98,13 @@ def magnetic(results: FlightResults) -> Section | None:
         *(Figure(f"magnetic.{name}") for name in ("held_out", "track")),
         _swings(answer),
         *(Note(sentence(remark)) for remark in answer.remarks),
+        *flux_parts(results),
         *ground_runs(results),
     )
     workings: tuple[Part | None, ...] = (
         *(Figure(f"magnetic.{name}") for name in ("branches", "modulus")),
         *(_turns(answer), _basis(answer), _iron(answer.poisson), Note(HOW), setting_facts(answer.settings, "magnetic")),
+        *flux_workings(results),
         *ground_workings(results),
     )
     headline = f"{TITLE}: {answer.verdict}"
@@ -105,8 +114,14 @@ def magnetic(results: FlightResults) -> Section | None:
 def _without_turns(results: FlightResults) -> Section | None:
     """Return the chapter of a flight without opposite turns.
 
-    Its ground runs, and why there is no deviation.
+    Its compass in flight, its ground runs, and why there is no deviation.
     """
+    in_flight = flux_claim(results)
+    if in_flight is not None:
+        agreement = agreement_note(deviation_agreement(results.answers))
+        parts = kept((*flux_parts(results), agreement, *ground_runs(results)))
+        workings = (*flux_workings(results), *ground_workings(results))
+        return Section("magnetic", FLUX_TITLE, FLUX_LEAD, parts, in_flight.headline, claim=in_flight, appendix=workings)
     reason, runs = reason_of(results, "magnetic"), ground_runs(results)
     if not runs and not reason:
         return None

@@ -119,14 +119,16 @@ def correct_heading(
         When the flight has neither, or the magnetometer is not that of the deviation.
     """
     settings = settings or MagneticSettings()
-    sensor, unit = _magnetometer(flight, deviation), _with_attitude(flight)
+    sensor = "" if deviation.is_of_heading else _magnetometer(flight, deviation)
+    unit = _with_attitude(flight)
     if sensor and unit:
         return _levelled(flight, deviation, (unit, sensor), settings, latencies)
     shown = [topic for topic in topics_of_kind("ins", flight.topics()) if flight[topic].has("magnetic_heading_deg")]
     if not shown:
         what = "an INS with roll and pitch" if sensor else "a three-axis magnetometer"
         raise NotAssessableError(ANALYSIS, f"neither {what} nor a magnetic heading in the log")
-    return _as_shown(flight, deviation, shown[0], settings)
+    topic = deviation.magnetometer_topic if deviation.magnetometer_topic in shown else shown[0]
+    return _as_shown(flight, deviation, topic, settings)
 
 
 def _magnetometer(flight: Flight, deviation: Deviation) -> str:

@@ -24,7 +24,8 @@ from groundstation.systems.magnetic.answer import (
     MagneticVerdict,
     PoissonParameters,
 )
-from groundstation.systems.magnetic.arrays import MagneticCurves, MagneticTable
+from groundstation.systems.magnetic.arrays import FluxCurve, MagneticCurves, MagneticTable
+from groundstation.systems.magnetic.flux_answer import FLUX_TITLES, FluxDeviation
 
 BINS = 360
 MIDDLE_TOLERANCE_DEG = 0.01  # a spreadsheet may have rounded
@@ -33,6 +34,7 @@ TABLE_TO_ADD, TABLE_SIGMA, COVERAGE = "table_deviation_to_add_deg", "table_devia
 METHOD, VERDICT, FLIGHT, AIRCRAFT = "method", "verdict", "flight_id", "aircraft"
 NEEDED = (READING, TO_ADD, METHOD, VERDICT)
 RUN_AGAIN = "run its log again"
+TITLES: dict[str, str] = {str(name): title for name, title in (*METHOD_TITLES.items(), *FLUX_TITLES.items())}
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,11 @@ class Deviation:
     iron: PoissonParameters | None = None
 
     @property
+    def is_of_heading(self) -> bool:
+        """Tell whether it is that of a compass that gives heading alone."""
+        return self.method in FLUX_TITLES
+
+    @property
     def title(self) -> str:
         """Name of the flight it is of, for people."""
         return self.flight_id or "an unnamed flight"
@@ -87,6 +94,12 @@ def deviation_of(found: MagneticResult, flight_id: str, aircraft: str) -> Deviat
     )
 
 
+def flux_deviation_of(found: FluxDeviation, flight_id: str, aircraft: str) -> Deviation:
+    """The deviation of a compass that gives heading alone."""
+    name, verdict, reason, topic = found.recommended_method, found.verdict, found.verdict_reason, found.ins_topic
+    return Deviation(flight_id, aircraft, name, verdict, reason, topic, found.deviation_deg)
+
+
 def deviation_from_summary(summary: Mapping[str, Any], where: str) -> Deviation:
     """The deviation in a flight's summary.json.
 
@@ -96,14 +109,17 @@ def deviation_from_summary(summary: Mapping[str, Any], where: str) -> Deviation:
         When it holds none, or one that cannot be used.
     """
     flight = mapping(summary, "flight")
-    if not mapping(summary, "results", "magnetic"):
+    whose = str(flight.get("id") or ""), str(flight.get("aircraft") or "")
+    of_heading = bool(mapping(summary, "results", "magnetic_flux")) and not mapping(summary, "results", "magnetic")
+    if not of_heading and not mapping(summary, "results", "magnetic"):
         entries = summary.get("not_assessable")
         found = [mapping(one) for one in entries] if isinstance(entries, list) else []
         why = next((f" ({one.get('reason')})" for one in found if one.get("analysis") == "magnetic"), "")
         raise UsageError(where, f"no magnetic deviation{why}", "the summary.json of a flight that has one")
     try:
-        magnetic = restored_answer(summary, MagneticResult)
-        own = deviation_of(magnetic, str(flight.get("id") or ""), str(flight.get("aircraft") or ""))
+        if of_heading:
+            return _checked(flux_deviation_of(restored_answer(summary, FluxDeviation), *whose), where)
+        own = deviation_of(restored_answer(summary, MagneticResult), *whose)
         return _checked(own, where)
     except (MismatchError, ValueError, KeyError, TypeError, AttributeError) as error:
         what = f"a magnetic deviation that cannot be used ({error})"
@@ -155,8 +171,10 @@ def deviation_csv(results: FlightResults) -> str | None:
     Source of the form: RFC 4180, Common Format and MIME Type for CSV Files, 2005.
     """
     magnetic = results.answer(MagneticResult)
+    if magnetic is None:
+        return _flux_csv(results)
     curves, table = results.rows_of(MagneticCurves), results.rows_of(MagneticTable)
-    if magnetic is None or curves is None or table is None:
+    if curves is None or table is None:
         return None
     if len(table) != len(curves) or "compass_table" not in curves.sigma_deg:
         return None
@@ -168,22 +186,40 @@ def deviation_csv(results: FlightResults) -> str | None:
         TABLE_SIGMA: curves.sigma_deg["compass_table"],
         COVERAGE: np.where(table.is_interpolated, "interpolated", "covered"),
     }
+    return _with_owner(columns, magnetic.recommended_method, magnetic.verdict, results)
+
+
+def _flux_csv(results: FlightResults) -> str | None:
+    """Return the table of a compass that gives heading alone; None without one."""
+    found, curve = results.answer(FluxDeviation), results.rows_of(FluxCurve)
+    if found is None or curve is None:
+        return None
+    columns: dict[str, NDArray[Any]] = {
+        READING: curve.uncorrected_magnetic_heading_deg,
+        TO_ADD: curve.deviation_to_add_deg,
+        SIGMA: curve.deviation_sigma_deg,
+        COVERAGE: np.where(curve.is_interpolated, "interpolated", "covered"),
+    }
+    return _with_owner(columns, found.recommended_method, found.verdict, results)
+
+
+def _with_owner(columns: dict[str, NDArray[Any]], method: str, verdict: str, results: FlightResults) -> str:
     owner = {
-        METHOD: magnetic.recommended_method,
-        VERDICT: magnetic.verdict,
+        METHOD: method,
+        VERDICT: verdict,
         FLIGHT: results.flight_id,
         AIRCRAFT: results.metadata.get("aircraft", ""),
     }
-    columns |= {name: np.full(len(table), value) for name, value in owner.items()}
-    return csv_text(FigureData("deviation", columns, {}), "\r\n")
+    told = columns | {name: np.full(BINS, value) for name, value in owner.items()}
+    return csv_text(FigureData("deviation", told, {}), "\r\n")
 
 
 def _checked(found: Deviation, where: str) -> Deviation:
     """The deviation, if every number of it is one and its verdict is known."""
     if found.verdict not in get_args(MagneticVerdict):
         raise UsageError(where, f"the verdict {found.verdict!r}", f"one of {', '.join(get_args(MagneticVerdict))}")
-    if found.method not in METHOD_TITLES:
-        raise UsageError(where, f"the method {found.method!r}", f"one of {', '.join(METHOD_TITLES)}")
+    if found.method not in TITLES:
+        raise UsageError(where, f"the method {found.method!r}", f"one of {', '.join(TITLES)}")
     numbers = [*found.table_deg, *(found.coefficients_deg.get(letter, math.nan) for letter in LETTERS)]
     numbers = numbers[:BINS] if found.table_deg else numbers
     if found.iron is not None:

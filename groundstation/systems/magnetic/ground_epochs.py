@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180, wrap_360
 from groundstation.base.declination import declination_along
 from groundstation.base.errors import NotAssessableError
+from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.methods.taxi.delay import known_delay
 from groundstation.methods.taxi.gating import gate_samples
@@ -27,10 +28,12 @@ from groundstation.tables.headings import FARTHEST_POSITION_S
 from groundstation.tables.phases import ground_mask
 from groundstation.tables.resample import join
 from groundstation.tables.sources import GNSS_VELOCITY, Need, PairNeed
-from groundstation.tables.table import Flight
+from groundstation.tables.table import Flight, Table
 
 ANALYSIS = "magnetic_ground"
 PAIR = PairNeed(ANALYSIS, Need("ins", "magnetic heading", ("magnetic_heading_deg",)), GNSS_VELOCITY)
+STEPS_DEG, OFF_STEP_DEG, LEAST_VALUES = (5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01), 1e-4, 20
+VARIATION_GAP_S = 5.0
 SETTLING, NOT_GROUND = "after a turn", "not proven ground"
 WHY_LEFT_OUT = {
     "too slow": "slow",
@@ -154,3 +157,31 @@ def _positions(flight: Flight, topics: tuple[str, str], at_ns: NDArray[np.int64]
             latitude, longitude = joined.values(names[0]), joined.values(names[1])
             return np.where(np.abs(latitude) <= 90.0, latitude, np.nan), longitude
     return np.full(len(at_ns), np.nan), np.full(len(at_ns), np.nan)
+
+
+def step_of(table: Table, name: str) -> float | None:
+    """Return the step an angle is logged in; None: none.
+
+    The step is the largest of those that angles are rounded to that holds every value.
+    """
+    values = table.values(name)
+    known = np.unique(values[np.isfinite(values)])
+    if len(known) < LEAST_VALUES:
+        return None
+    return next(
+        (step for step in STEPS_DEG if np.all(np.abs(known - step * np.round(known / step)) < OFF_STEP_DEG)), None
+    )
+
+
+def logged_variation_deg(flight: Flight, ins_topic: str, at_ns: Int64Array) -> float | None:
+    """Return the mean of true minus magnetic heading that the log's variation makes.
+
+    The mean is known where the reader made the one from the other with that variation.
+    """
+    names = ("true_heading_deg", "magnetic_heading_deg")
+    derived = flight.metadata.get(f"derived.{ins_topic}.true_heading_deg", "")
+    if "magnetic" not in derived or not flight[ins_topic].has(*names):
+        return None
+    joined = join(flight[ins_topic], at_ns, names, largest_gap_s=VARIATION_GAP_S)
+    variation = mean_heading(wrap_360(joined.values(names[0]) - joined.values(names[1])))
+    return float(wrap_180(variation)) if np.isfinite(variation) else None

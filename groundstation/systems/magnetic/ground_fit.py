@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -10,11 +11,23 @@ from groundstation.base.words import listed
 from groundstation.methods import harmonics
 from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.ground_answer import AlongAxis, GroundCoefficient, GroundRun, Repeat
-from groundstation.systems.magnetic.ground_settings import MagneticGroundSettings
 
 FLAT_DEG = 180.0  # prior of A: nothing is known of it
 PLACE_STEPS, PLACE_REACH = 60, 4.0  # steps of the spread between runs, and how many of its scale they reach
 TANGLED = 0.3  # correlation beyond which two coefficients are not told from each other
+
+
+class KnownBefore(Protocol):
+    """Settings of the fit: what is taken for known before a log is looked at."""
+
+    @property
+    def place_sigma_deg(self) -> float: ...
+    @property
+    def semicircular_sigma_deg(self) -> float: ...
+    @property
+    def quadrantal_sigma_deg(self) -> float: ...
+    @property
+    def known_share(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -27,7 +40,13 @@ class CurveFit:
 
 
 def fit_curve(
-    heading_deg: FloatArray, error_deg: FloatArray, sigma_deg: FloatArray, settings: MagneticGroundSettings
+    heading_deg: FloatArray,
+    error_deg: FloatArray,
+    sigma_deg: FloatArray,
+    settings: KnownBefore,
+    *,
+    columns: FloatArray | None = None,
+    common: FloatArray | None = None,
 ) -> CurveFit:
     """Posterior of A to E, with what a run has of its own integrated out.
 
@@ -39,17 +58,23 @@ def fit_curve(
     ----------
     heading_deg, error_deg, sigma_deg : ndarray, shape (n,)
         Magnetic heading, error and its standard deviation without what is common to all runs.
+    columns : ndarray, shape (n, 5), optional
+        In place of those of the headings: of a display that lags.
+    common : ndarray, shape (n, n), optional
+        Covariance of the errors besides: of the wind they rest on.
 
     Source: A. Gelman et al., Bayesian Data Analysis, third edition, 2013, sections 5.4 and 14.2.
     """
-    columns, prior = harmonics.design(heading_deg), np.diag(_prior_sigma(settings) ** 2)
+    columns = harmonics.design(heading_deg) if columns is None else columns
+    prior = np.diag(_prior_sigma(settings) ** 2)
+    shared = np.zeros((len(error_deg), len(error_deg))) if common is None else common
     scale = settings.place_sigma_deg
     own = np.linspace(0.0, PLACE_REACH * scale, PLACE_STEPS + 1)
     middle = mean_heading(error_deg)
     left = wrap_180(error_deg - middle)
     log_weight, means, covariances = np.empty(len(own)), [], []
     for place, spread in enumerate(own):
-        noise = np.diag(sigma_deg**2 + spread**2)
+        noise = np.diag(sigma_deg**2 + spread**2) + shared
         expected = columns @ prior @ columns.T + noise
         gain = np.linalg.solve(expected, columns @ prior).T
         _sign, log_determinant = np.linalg.slogdet(expected)
@@ -67,12 +92,12 @@ def fit_curve(
     return CurveFit(values, covariance, float(weight @ own))
 
 
-def _prior_sigma(settings: MagneticGroundSettings) -> FloatArray:
+def _prior_sigma(settings: KnownBefore) -> FloatArray:
     semicircular, quadrantal = settings.semicircular_sigma_deg, settings.quadrantal_sigma_deg
     return np.array([FLAT_DEG, semicircular, semicircular, quadrantal, quadrantal])
 
 
-def limits_deg(settings: MagneticGroundSettings) -> FloatArray:
+def limits_deg(settings: KnownBefore) -> FloatArray:
     """Sigma up to which each of A to E is given, shape (5,)."""
     before = _prior_sigma(settings)
     before[0] = settings.semicircular_sigma_deg
@@ -80,7 +105,7 @@ def limits_deg(settings: MagneticGroundSettings) -> FloatArray:
 
 
 def coefficients_of(
-    fit: CurveFit, declination_sigma_deg: float, settings: MagneticGroundSettings
+    fit: CurveFit, declination_sigma_deg: float, settings: KnownBefore
 ) -> tuple[GroundCoefficient, ...]:
     """A to E, each given or not, with the reason; the declination counts in A alone."""
     covariance = with_declination(fit.covariance, declination_sigma_deg)
@@ -106,9 +131,7 @@ def with_declination(covariance: FloatArray, declination_sigma_deg: float) -> Fl
     return widened
 
 
-def along_axis(
-    fit: CurveFit, coefficients: Sequence[GroundCoefficient], settings: MagneticGroundSettings
-) -> AlongAxis | None:
+def along_axis(fit: CurveFit, coefficients: Sequence[GroundCoefficient], settings: KnownBefore) -> AlongAxis | None:
     """Return the best seen axis of the semicircular error where B or C alone is not seen.
 
     None where no axis is either. B sin c + C cos c on the axis a is (B sin a + C cos a) cos(c - a), and another part
@@ -126,7 +149,7 @@ def along_axis(
 
 
 def curve(
-    fit: CurveFit, heading_deg: FloatArray, declination_sigma_deg: float, settings: MagneticGroundSettings
+    fit: CurveFit, heading_deg: FloatArray, declination_sigma_deg: float, settings: KnownBefore
 ) -> tuple[FloatArray, FloatArray]:
     """Return the error and its sigma at magnetic headings, shapes (n,).
 

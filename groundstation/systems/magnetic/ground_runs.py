@@ -30,6 +30,8 @@ from groundstation.systems.magnetic.ground_epochs import (
     count_left_out,
     declination_at,
     gated,
+    logged_variation_deg,
+    step_of,
 )
 from groundstation.systems.magnetic.ground_fit import (
     CurveFit,
@@ -43,16 +45,14 @@ from groundstation.systems.magnetic.ground_fit import (
 )
 from groundstation.systems.magnetic.ground_settings import MagneticGroundSettings
 from groundstation.tables.phases import Phases, flight_phases
-from groundstation.tables.resample import join
 from groundstation.tables.sources import choose_pair
-from groundstation.tables.table import Flight, Table
+from groundstation.tables.table import Flight
 
 SMOOTHED_S = 5.0  # over which the heading is smoothed before its range is taken
 MOST_EPOCHS = 1500  # of the noise model; more are thinned
 MODEL_MPS = 8.0  # at which the priors of the noise model are those of a heading sensor too
 FREE_DEG, PINNED_DEG = 30.0, 1e-3  # prior of an error of a run about their middle, and of that middle
 STEPPED = ("magnetic_heading_deg", "track_deg")
-STEPS_DEG, OFF_STEP_DEG, LEAST_VALUES = (5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01), 1e-4, 20
 
 
 def estimate_ground_deviation(
@@ -115,7 +115,7 @@ def estimate_ground_deviation(
     runs = _runs(epochs, phases, settings)
     if not any(run.state == "used" for run in runs):
         raise NotAssessableError(ANALYSIS, _why_no_run(samples, left_out, settings, runs))
-    steps = tuple(_step_deg(flight[topic], name) for topic, name in zip(topics, STEPPED, strict=True))
+    steps = tuple(step_of(flight[topic], name) for topic, name in zip(topics, STEPPED, strict=True))
     runs = _with_errors(runs, epochs, used.sigma_deg, steps, settings)
     return _answer(flight, topics, epochs, runs, left_out, used, steps, settings)
 
@@ -190,20 +190,6 @@ def _why_rejected(
     return f"curved: {name} changed by {change:.0f} deg" if change > settings.heading_change_max_deg else ""
 
 
-def _step_deg(table: Table, name: str) -> float | None:
-    """Return the step an angle is logged in; None: none.
-
-    The step is the largest of those that angles are rounded to that holds every value.
-    """
-    values = table.values(name)
-    known = np.unique(values[np.isfinite(values)])
-    if len(known) < LEAST_VALUES:
-        return None
-    return next(
-        (step for step in STEPS_DEG if np.all(np.abs(known - step * np.round(known / step)) < OFF_STEP_DEG)), None
-    )
-
-
 def _with_errors(
     runs: tuple[GroundRun, ...],
     epochs: GroundEpochs,
@@ -273,27 +259,13 @@ def _answer(
         coefficients=coefficients,
         along=along_axis(fit, coefficients, settings),
         repeats=repeats_of(used, settings.slip_sigma_deg, settings.repeat_within_deg),
-        logged_variation_deg=_logged_variation_deg(flight, topics[0], epochs),
+        logged_variation_deg=logged_variation_deg(flight, topics[0], epochs.samples.time_ns),
         heading_step_deg=steps_deg[0],
         track_step_deg=steps_deg[1],
         settings={name: value for name, value in asdict(settings).items() if value is not None},
         figures=_figures(epochs, runs, fit, declination.sigma_deg, settings),
     )
     return replace(result, remarks=_remarks(result, epochs.samples.interval_s, settings))
-
-
-def _logged_variation_deg(flight: Flight, ins_topic: str, epochs: GroundEpochs) -> float | None:
-    """Return the mean of true minus magnetic heading that the log's variation makes.
-
-    The mean is known where the reader made the one from the other with that variation.
-    """
-    names = ("true_heading_deg", "magnetic_heading_deg")
-    derived = flight.metadata.get(f"derived.{ins_topic}.true_heading_deg", "")
-    if "magnetic" not in derived or not flight[ins_topic].has(*names):
-        return None
-    joined = join(flight[ins_topic], epochs.samples.time_ns, names, largest_gap_s=SMOOTHED_S)
-    variation = mean_heading(wrap_360(joined.values(names[0]) - joined.values(names[1])))
-    return float(wrap_180(variation)) if np.isfinite(variation) else None
 
 
 def _figures(

@@ -8,7 +8,9 @@ from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.chapters.parts import Mark, Paper
 from groundstation.chapters.wording import ABSENT, is_number, number, typeset
 from groundstation.results.flight import FlightResults
-from groundstation.systems.magnetic.answer import ADVISORY, DEVIATION_CSV, METHOD_TITLES, CardRow, MagneticResult
+from groundstation.systems.magnetic.answer import ADVISORY, DEVIATION_CSV, CardRow, MagneticResult
+from groundstation.systems.magnetic.deviation_answer import TITLES
+from groundstation.systems.magnetic.flux_answer import REFERENCE_TITLES, FluxDeviation
 
 TEMPLATE = Path(__file__).parent / "steer_card.typ"
 MOST_ROWS = 36  # of a page of A6: every 10 deg
@@ -55,18 +57,17 @@ class SteerCard:
 
 def steer_card_page(results: FlightResults) -> Paper | None:
     """Return the card of a flight that has a deviation; None of any other."""
-    answer = results.answer(MagneticResult)
+    answer = results.answer(MagneticResult) or results.answer(FluxDeviation)
     return None if answer is None else Paper(steer_card(results, answer), TEMPLATE)
 
 
-def steer_card(results: FlightResults, answer: MagneticResult) -> SteerCard:
+def steer_card(results: FlightResults, answer: MagneticResult | FluxDeviation) -> SteerCard:
     """Build the card of a flight from its deviation."""
     start_ns = results.start_utc_ns
     pairs = (
         ("Flight", _shorter(results.flight_id, 2 * MOST_LETTERS)),
         ("Date", "not known" if start_ns is None else utc_ns_to_iso(start_ns)[:10]),
-        ("Magnetometer", _shorter(answer.magnetometer_topic)),
-        ("Swung against", _shorter(answer.ins_topic)),
+        *_sensors(answer),
     )
     state, reason = _state(answer)
     rows = answer.card[:: max(1, -(-len(answer.card) // MOST_ROWS))]  # every k-th, so that they fit on the page
@@ -80,7 +81,13 @@ def steer_card(results: FlightResults, answer: MagneticResult) -> SteerCard:
     )
 
 
-def _state(answer: MagneticResult) -> tuple[Mark, str]:
+def _sensors(answer: MagneticResult | FluxDeviation) -> tuple[tuple[str, str], ...]:
+    if isinstance(answer, FluxDeviation):
+        return ("Compass", _shorter(answer.ins_topic)), ("Swung against", REFERENCE_TITLES[answer.reference.name])
+    return ("Magnetometer", _shorter(answer.magnetometer_topic)), ("Swung against", _shorter(answer.ins_topic))
+
+
+def _state(answer: MagneticResult | FluxDeviation) -> tuple[Mark, str]:
     """Return the verdict; any but accept is printed large."""
     reason = _shorter(typeset(answer.verdict_reason), MOST_OF_A_REASON)
     if answer.verdict == "accept":
@@ -103,17 +110,20 @@ def _three_digits(heading_deg: float) -> str:
     return f"{round(heading_deg) % 360:03d}" if is_number(heading_deg) else ABSENT
 
 
-def _remarks(answer: MagneticResult, rows: Sequence[CardRow]) -> tuple[str, ...]:
+def _remarks(answer: MagneticResult | FluxDeviation, rows: Sequence[CardRow]) -> tuple[str, ...]:
     residual = answer.residual_rms_deg
+    is_heading = isinstance(answer, FluxDeviation)
+    where = "on straight legs" if is_heading else "in level flight"
+    missing = "no leg near it" if is_heading else "no reading of both turns near it"
     left = (
-        f"RMS error in level flight {number(residual.before, 2, '°')} before, {number(residual.after, 2, '°')} after."
+        f"RMS error {where} {number(residual.before, 2, '°')} before, {number(residual.after, 2, '°')} after."
         if residual
         else "RMS error after: not measured."
     )
-    told = [f"By the {METHOD_TITLES[answer.recommended_method]}. {left}"]
+    told = [f"By the {TITLES[answer.recommended_method]}. {left}"]
     told.append("Steer: the uncorrected reading. Add: its deviation ± σ, east positive.")
     if any(row.is_interpolated for row in rows):
-        told.append("* no reading of both turns near it: interpolated.")
+        told.append(f"* {missing}: interpolated.")
     if len(rows) < len(answer.card):
         told.append(f"Every degree: {DEVIATION_CSV}.")
     return tuple(told)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from groundstation.systems.magnetic.analysis import MAGNETIC, MAGNETIC_GROUND
+from groundstation.systems.magnetic.analysis import MAGNETIC, MAGNETIC_FLUX, MAGNETIC_GROUND
 from groundstation.systems.magnetic.answer import DEVIATION_CSV, STEER_CARD
 from groundstation.systems.system import Export, Study, System, Tab
 
@@ -20,11 +20,12 @@ def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.chapters.chapter import Chapter
     from groundstation.systems.magnetic.answer import MagneticResult
     from groundstation.systems.magnetic.chapter import SOURCES, magnetic
+    from groundstation.systems.magnetic.flux_answer import FluxDeviation
     from groundstation.systems.magnetic.ground_answer import GroundDeviation
 
     return (
         Chapter(
-            (MagneticResult, GroundDeviation),
+            (MagneticResult, GroundDeviation, FluxDeviation),
             magnetic,
             sources=SOURCES,
         ),
@@ -52,9 +53,10 @@ def _advice() -> "Adviser":
 
 
 def _plots() -> "Mapping[str, Describe]":
+    from groundstation.systems.magnetic import flux_plots
     from groundstation.systems.magnetic import plots as magnetic
 
-    return magnetic.PLOTS
+    return {**magnetic.PLOTS, **flux_plots.PLOTS}
 
 
 def _tabs() -> tuple[Tab, ...]:
@@ -62,7 +64,7 @@ def _tabs() -> tuple[Tab, ...]:
 
     return (
         Tab(
-            ("magnetic", "magnetic_ground"),
+            ("magnetic", "magnetic_ground", "magnetic_flux"),
             magnetic,
         ),
     )
@@ -86,6 +88,12 @@ def _study_magnetic() -> "Callable[..., StudyResult]":
     return study_magnetic
 
 
+def _study_flux() -> "Callable[..., StudyResult]":
+    from groundstation.systems.magnetic.study.flux import study_flux
+
+    return study_flux
+
+
 def _apply() -> "ApplyStep":
     from groundstation.systems.magnetic.apply_deviation import STEP
 
@@ -94,17 +102,20 @@ def _apply() -> "ApplyStep":
 
 SYSTEM = System(
     name="magnetic",
-    analyses=(MAGNETIC, MAGNETIC_GROUND),
+    analyses=(MAGNETIC, MAGNETIC_GROUND, MAGNETIC_FLUX),
     studies=(
         Study(
             "magnetic",
             "magnetic deviation: error of every method, the published claim and its limit, how honest sigmas are",
             _study_magnetic,
         ),
+        Study("flux", "flux valve in flight: how honest the sigmas of A to E are, cell by cell", _study_flux),
     ),
     exports=(
         Export(DEVIATION_CSV, MAGNETIC.name, _deviation_csv),
         Export(STEER_CARD, MAGNETIC.name, _steer_card, is_page=True),
+        Export(DEVIATION_CSV, MAGNETIC_FLUX.name, _deviation_csv),
+        Export(STEER_CARD, MAGNETIC_FLUX.name, _steer_card, is_page=True),
     ),
     chapters=_chapters,
     plots=_plots,

@@ -11,6 +11,7 @@ from groundstation.systems.magnetic.answer import MagneticResult
 from groundstation.systems.magnetic.arrays import CorrectedHeadingRows
 from groundstation.systems.magnetic.chapter import magnetic as chapter
 from groundstation.systems.magnetic.field_tab import sphere
+from groundstation.systems.magnetic.flux_answer import FluxDeviation
 from groundstation.systems.magnetic.ground_answer import GroundDeviation
 from groundstation.viewer import colours
 from groundstation.viewer.plot_views import panels_of, plot_of
@@ -26,15 +27,15 @@ def magnetic(recorder: Recorder, results: FlightResults) -> rrb.Container | None
     The overview says why.
     """
     section = chapter(results)
-    if section is None or not any(results.answer(kind) for kind in (MagneticResult, GroundDeviation)):
+    if section is None or not any(results.answer(kind) for kind in (MagneticResult, GroundDeviation, FluxDeviation)):
         return None
     recorder.document("magnetic/answer", markdown(section))
 
     def views(*names: str) -> list[rrb.View]:
         return [view for name in names for view in panels_of(recorder, plot_of(recorder, name, results))]
 
-    left = views("magnetic.deviation", "magnetic.branches", "magnetic.ground_runs")
-    middle = [*views("magnetic.held_out", "magnetic.modulus"), *_applied(recorder, results)]
+    left = views("magnetic.deviation", "magnetic.branches", "magnetic.flux_legs", "magnetic.ground_runs")
+    middle = [*views("magnetic.held_out", "magnetic.modulus", "magnetic.flux_turns"), *_applied(recorder, results)]
     right = [*sphere(recorder, results), *views("magnetic.track"), document("Verdict and card", "magnetic/answer")]
     columns = [rrb.Vertical(contents=column) for column in (left, middle, right) if column]
     return rrb.Horizontal(contents=columns, name="Magnetic")

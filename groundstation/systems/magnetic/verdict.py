@@ -143,7 +143,7 @@ def rejudge(answer: MagneticResult, settings: MagneticSettings) -> tuple[Rejudge
     The values are those that it was judged by.
     """
     bounds = gate_bounds(settings)
-    after = tuple(_told(gate.under(bounds[gate.name])) if gate.name in bounds else gate for gate in answer.gates)
+    after = tuple(told(gate.under(bounds[gate.name])) if gate.name in bounds else gate for gate in answer.gates)
     return (Rejudged("magnetic", answer.verdict, decide(after)[0], answer.gates, after),)
 
 
@@ -170,10 +170,10 @@ def _gate(
     is_required: bool = True,
     reason: str = "not measured",
 ) -> Gate:
-    return _told(judged_gate(bounds[name], name, title, value, unit=unit, required=is_required, reason=reason))
+    return told(judged_gate(bounds[name], name, title, value, unit=unit, required=is_required, reason=reason))
 
 
-def _told(gate: Gate) -> Gate:
+def told(gate: Gate) -> Gate:
     """Return the gate with its reason: figure and limit where it failed, none where it passed."""
     if gate.value is None:
         return gate

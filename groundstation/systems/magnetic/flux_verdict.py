@@ -1,0 +1,56 @@
+"""Gates and verdict of the deviation of a flux valve."""
+
+from collections.abc import Mapping
+
+from groundstation.results.gates import Bound, Gate, judged_gate
+from groundstation.results.rules import Rejudged
+from groundstation.systems.magnetic.answer import MagneticVerdict
+from groundstation.systems.magnetic.flux_answer import FluxDeviation
+from groundstation.systems.magnetic.flux_settings import MagneticFluxSettings
+from groundstation.systems.magnetic.verdict import decide, told
+
+
+def flux_gates(values: Mapping[str, float | None], settings: MagneticFluxSettings) -> tuple[Gate, ...]:
+    """Build every gate with its figure; one that cannot be measured informs."""
+    bounds = _bounds(settings)
+    titles = {
+        "gap": ("widest part of the circle without a leg or a turn", "deg", ""),
+        "curve": ("sigma of the curve without A, rms over the circle", "deg", ""),
+        "level": ("sigma of A: declination and reference in it", "deg", ""),
+        "left": (
+            "rms error of legs after correction by what they were not in",
+            "deg",
+            "fewer than six directions",
+        ),
+        "dip": ("dip of the earth's field, up or down", "deg", "no model of the field"),
+    }
+    return tuple(
+        told(
+            judged_gate(
+                bounds[name], name, title, values[name], unit=unit, reason=reason, required=values[name] is not None
+            )
+        )
+        for name, (title, unit, reason) in titles.items()
+    )
+
+
+def flux_rejudge(answer: FluxDeviation, settings: MagneticFluxSettings) -> tuple[Rejudged, ...]:
+    """Apply other limits to the gates and the verdict of an answer."""
+    bounds = _bounds(settings)
+    after = tuple(told(gate.under(bounds[gate.name])) if gate.name in bounds else gate for gate in answer.gates)
+    return (Rejudged("magnetic_flux", answer.verdict, flux_decide(after)[0], answer.gates, after),)
+
+
+def flux_decide(gates: tuple[Gate, ...]) -> tuple[MagneticVerdict, str]:
+    """Decide the verdict and its reason from the gates."""
+    return decide(gates)
+
+
+def _bounds(settings: MagneticFluxSettings) -> dict[str, Bound]:
+    return {
+        "gap": (None, settings.gap_max_deg),
+        "curve": (None, settings.curve_sigma_max_deg),
+        "level": (None, settings.a_sigma_max_deg),
+        "left": (None, settings.left_rms_max_deg),
+        "dip": (None, settings.dip_max_deg),
+    }
