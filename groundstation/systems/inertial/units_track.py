@@ -29,7 +29,7 @@ class UnitTrack(_Frozen):
     latitude_deg, longitude_deg : ndarray, shape (n,)
     velocity_mps : ndarray, shape (n, 2)
         North and east.
-    heading_deg : ndarray, shape (n,), optional
+    heading_deg, altitude_m : ndarray, shape (n,), optional
     kind, kind_reason : str
         Whether GNSS corrects it, and who says so (:mod:`groundstation.tables.sources`).
     serials : tuple of (float, str)
@@ -44,6 +44,7 @@ class UnitTrack(_Frozen):
     longitude_deg: FloatArray
     velocity_mps: FloatArray
     heading_deg: FloatArray | None = None
+    altitude_m: FloatArray | None = None
     kind: str = UNKNOWN
     kind_reason: str = ""
     serials: tuple[tuple[float, str], ...] = ()
