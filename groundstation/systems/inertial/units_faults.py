@@ -16,7 +16,9 @@ from groundstation.tables.motion import runs
 
 LEAST_STUCK_S = 10.0
 LEAST_MOVED_MPS, RESOLUTIONS = 0.3, 5.0  # what others must show while a velocity stands still
-QUICK_S, MOST_CHANGES = 30.0, 0.9
+QUICK_S, MOST_CHANGES = 10.0, 0.6
+LEAST_FLOWN_MPS = 3.0
+NEIGHBOURS, OFTEN, IMPOSSIBLE = 60, 0.3, -6.0  # rows; share of repeated values; decimal logarithm of the chance
 LEAST_FROZEN_M = 100.0
 CLEARLY_OFF_MPS, CLEARLY_BETTER = 10.0, 0.3  # for axes to be swapped
 LEAST_STEP_M, LEAST_STEP_MPS = 15.0, 0.3
@@ -60,26 +62,54 @@ class Jump:
 def held_spans(track: UnitTrack, others: Sequence[OnGrid]) -> tuple[Held, ...]:
     """Find the spans in which velocities or all outputs of a unit stand still and others move.
 
-    A velocity stands still when it keeps one value for ten seconds or longer while another track's moves by more than
-    0.3 m/s and five of the unit's own resolutions.
+    A velocity sticks when it keeps one value for ten seconds or longer while the other tracks change quickly, or where
+    the unit's own noise makes so long a run next to impossible. A unit is frozen when its position stands still, too.
     """
     found: list[Held] = []
     for axis in range(2):
         values = track.velocity_mps[:, axis]
-        known = np.isfinite(values)
-        steps = np.abs(np.diff(values[known]))
-        least = max(LEAST_MOVED_MPS, RESOLUTIONS * float(np.min(steps[steps > ROUNDING], initial=np.inf)))
-        if not np.isfinite(least):
-            least = LEAST_MOVED_MPS
-        for start, end in runs(np.concatenate([[False], np.diff(values) == 0.0])):
+        same = np.concatenate([[False], np.diff(values) == 0.0])
+        steps = np.abs(np.diff(values[np.isfinite(values)]))
+        finest = float(np.min(steps[steps > ROUNDING], initial=np.inf))
+        least = max(LEAST_MOVED_MPS, RESOLUTIONS * (finest if np.isfinite(finest) else 0.0))
+        for start, end in runs(same):
             span = float(track.time_s[start - 1]), float(track.time_s[end - 1])
-            if span[1] - span[0] >= LEAST_STUCK_S and _moves(others, span, axis) > least:
-                found.append(Held(*span, (axis,), _is_frozen(track, span, others)))
+            if span[1] - span[0] < LEAST_STUCK_S or _distance_m(others, span) < LEAST_FLOWN_MPS * (span[1] - span[0]):
+                continue
+            if _moves(others, span, axis) > least or _is_impossible(same, start, end):
+                found.append(Held(*span, (axis,), False))
+    places = np.concatenate([[False], (np.diff(track.latitude_deg) == 0.0) & (np.diff(track.longitude_deg) == 0.0)])
+    for start, end in runs(places):
+        span = float(track.time_s[start - 1]), float(track.time_s[end - 1])
+        if span[1] - span[0] >= LEAST_STUCK_S and _distance_m(others, span) > LEAST_FROZEN_M:
+            found.append(Held(*span, (0, 1), True))
     return _joined(found)
 
 
+def _is_impossible(same: BoolArray, start: int, end: int) -> bool:
+    """Tell whether a unit that repeats values as often as it does elsewhere would not make so long a run."""
+    reach = max(end - start, NEIGHBOURS)
+    near = np.concatenate([same[max(start - reach, 1) : start - 1], same[end + 1 : end + reach]])
+    elsewhere = np.concatenate([same[1 : start - 1], same[end + 1 :]])
+    if not (len(near) and len(elsewhere)):
+        return False
+    share = max(float(near.mean()), float(elsewhere.mean()), 1.0 / len(same))
+    return share < OFTEN and np.log10(len(same)) + (end - start) * np.log10(share) < IMPOSSIBLE
+
+
+def _distance_m(others: Sequence[OnGrid], span: tuple[float, float]) -> float:
+    """Return how far the others flew in a span, the least of them; 0 where none is known."""
+    found = []
+    for one in others:
+        velocity = one.velocity_mps[(one.time_s >= span[0]) & (one.time_s <= span[1])]
+        speed = np.hypot(*velocity.T)
+        if np.isfinite(speed).any():
+            found.append(float(np.nanmean(speed)) * (span[1] - span[0]))
+    return min(found, default=0.0)
+
+
 def _moves(others: Sequence[OnGrid], span: tuple[float, float], axis: int) -> float:
-    """Return by how much the others' velocity changes within half a minute of a span, the least of them.
+    """Return by how much the others' velocity changes within ten seconds, the least of them.
 
     0 where none is known. Slow errors of the others change less in that time.
     """
@@ -91,17 +121,6 @@ def _moves(others: Sequence[OnGrid], span: tuple[float, float], axis: int) -> fl
         if np.isfinite(changes).any():
             found.append(float(np.nanquantile(changes, MOST_CHANGES)))
     return min(found, default=0.0)
-
-
-def _is_frozen(track: UnitTrack, span: tuple[float, float], others: Sequence[OnGrid]) -> bool:
-    rows = (track.time_s >= span[0]) & (track.time_s <= span[1])
-    places = np.column_stack([track.latitude_deg[rows], track.longitude_deg[rows]])
-    stands = bool(np.isfinite(places).all() and (np.ptp(places, axis=0) == 0.0).all())
-    moved = 0.0
-    for one in others:
-        velocity = one.velocity_mps[(one.time_s >= span[0]) & (one.time_s <= span[1])]
-        moved = max(moved, float(np.nansum(np.hypot(*velocity.T))) * float(one.time_s[1] - one.time_s[0]))
-    return stands and moved > LEAST_FROZEN_M
 
 
 def _joined(found: list[Held]) -> tuple[Held, ...]:

@@ -55,13 +55,14 @@ def grid_of(tracks: Sequence[UnitTrack | ReferenceTrack]) -> FloatArray:
     return np.arange(np.ceil(first), np.floor(last) + 0.5 * step, step)
 
 
-def on_grid(track: UnitTrack | ReferenceTrack, grid_s: FloatArray, late_s: tuple[float, float] = (0.0, 0.0)) -> OnGrid:
-    """Interpolate a track to the grid.
-
-    ``late_s`` is by how much its stamps are late in the middle of the grid, and how much more at the end of it.
-    """
+def in_time(time_s: FloatArray, grid_s: FloatArray, late_s: float, more_s: float) -> FloatArray:
+    """Return stamps on the common clock: late in the middle of the grid, and more at the end of it."""
     middle, half = 0.5 * (grid_s[0] + grid_s[-1]), max(0.5 * (grid_s[-1] - grid_s[0]), 1.0)
-    at = grid_s + late_s[0] + late_s[1] * (grid_s - middle) / half
+    return np.asarray(time_s - late_s - more_s * (time_s - late_s - middle) / half)
+
+
+def on_grid(track: UnitTrack | ReferenceTrack, grid_s: FloatArray) -> OnGrid:
+    """Interpolate a track to the grid."""
     latitude, longitude = on_earth(track.latitude_deg, track.longitude_deg)
     longitude = _unwrapped(longitude)
     heading = np.full(len(track.time_s), np.nan) if track.heading_deg is None else track.heading_deg
@@ -70,7 +71,7 @@ def on_grid(track: UnitTrack | ReferenceTrack, grid_s: FloatArray, late_s: tuple
         *(latitude, longitude, np.zeros(len(latitude)) if altitude is None else np.nan_to_num(altitude)),
         *(*track.velocity_mps.T, np.rad2deg(_unwrapped_rad(np.deg2rad(heading)))),
     ]
-    found = [_interpolated(track.time_s, column, at) for column in columns]
+    found = [_interpolated(track.time_s, column, grid_s) for column in columns]
     velocity = np.column_stack(found[3:5])
     return OnGrid(grid_s, found[0], found[1], np.nan_to_num(found[2]), velocity, found[5])
 

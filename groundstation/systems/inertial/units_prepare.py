@@ -28,7 +28,7 @@ from groundstation.systems.inertial.units_faults import (
     without_held,
     without_steps,
 )
-from groundstation.systems.inertial.units_grid import OnGrid, apart_m, grid_of, on_grid
+from groundstation.systems.inertial.units_grid import OnGrid, apart_m, grid_of, in_time, on_grid
 from groundstation.systems.inertial.units_track import ReferenceTrack, UnitTrack
 from groundstation.tables.sources import AIDED
 
@@ -221,14 +221,14 @@ def _timed(one: Prepared, fit: ClockFit | None, grid_s: FloatArray) -> Prepared:
     one = replace(one, late_s=fit.late_s, more_s=fit.more_s)
     if not (late or more):
         return one
-    one = replace(one, raw=on_grid(one.track, grid_s, (late, more)))
+    track = replace(one.track, time_s=in_time(one.track.time_s, grid_s, late, more))
+    one = replace(one, track=track, raw=on_grid(track, grid_s))
     return replace(one, clean=one.raw) if one.swapped is None else _turned(one, one.swapped)
 
 
 def _unstuck(one: Prepared, units: list[Prepared], against: OnGrid | None) -> Prepared:
     others = [other.clean for other in units if other.topic != one.topic and not other.same_as]
-    believed = others or [part for part in (against,) if part is not None]
-    held = held_spans(one.track, believed)
+    held = held_spans(one.track, [*others, *(part for part in (against,) if part is not None)])
     return replace(one, held=held, clean=without_held(one.clean, held)) if held else one
 
 
@@ -262,7 +262,7 @@ def _whose(seen: list[tuple[Jump, str, str]], tracks: dict[str, OnGrid]) -> list
         common = set.intersection(*({first, second} for _, first, second in group)) - {""}
         jump, first, second = max(group, key=lambda one: one[0].size.value)
         told = sorted(common) or sorted({first, second} - {""})
-        by = "by the other units" if len(group) > 1 else "by the reference" if "" in (first, second) else ""
+        by = "by the others" if len(group) > 1 else "by the reference" if "" in (first, second) else ""
         if len(told) > 1:
             spikes = sorted(told, key=lambda topic: own_spike(tracks[topic], jump.time_s))
             if own_spike(tracks[spikes[-1]], jump.time_s) > CLEARER * own_spike(tracks[spikes[0]], jump.time_s):

@@ -183,7 +183,7 @@ def _agreement(by_reference: Mapping[str, Judged], judged_pairs: int, reference:
         for one in by_reference.values()
         if one.shown is not None and one.shown.rate_nmiph is not None and one.ratios
     ]
-    if reference is not None and len(rates) > 1:
+    if reference is not None and rates:
         return f"no unit is off: {listed([f'{rate:.2f}' for rate in rates])} nmi/h against {reference.title}"
     if judged_pairs:
         return "no unit is off: they differ by no more than honest units of the class"
