@@ -75,6 +75,10 @@ def _any_settings(_settings: Any, _known: Any) -> None:
     """Accept any settings: values in range are fit to run with."""
 
 
+def _gives_nothing(_data: Any, _known: Any, _settings: Any) -> tuple[str, ...]:
+    return ()
+
+
 def _no_samples(_data: Any, _answer: Any) -> None:
     """Return no samples: no damage counts against the answer."""
 
@@ -156,6 +160,8 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     examine : callable, optional
         ``examine(data, known, settings)``: what the data lack, by the same selection of data as ``run`` makes; an
         analysis that has it is a purpose of ``check --for``.
+    gives : callable
+        ``gives(data, known, settings)``: what such data give beside the answer itself, a line each for ``check --for``.
     rules : Rules, optional
         Of an answer with gates.
     offers : mapping of role to callable
@@ -187,6 +193,7 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     columns: tuple[AnswerColumn[AnswerT], ...] = ()
     check: Callable[[Any, Any], None] = _any_settings
     examine: Examine[Data, KnownT, SettingsT] | None = None
+    gives: Callable[[Any, Any, Any], tuple[str, ...]] = _gives_nothing
     judges: bool = False
     assumes: str = ""
     rules: Rules | None = None

@@ -40,28 +40,35 @@ class Usability:
     state : str
         ``no``: the analysis would give no answer; ``in part``: the answer would fall short by what is listed.
     shortfalls : tuple of Shortfall
+    gives : tuple of str
+        What the data give beside the answer itself.
     """
 
     purpose: str
     state: Literal["yes", "in part", "no"]
     shortfalls: tuple[Shortfall, ...] = ()
+    gives: tuple[str, ...] = ()
 
     @property
     def text(self) -> str:
-        """Judgement in one line: state, what is missing, and where.
+        """Judgement in one line: state, what is missing, and where, what is given besides.
 
         Examples
         --------
         >>> Usability("heading", "in part", (Shortfall("12 s of straight taxi, 20 s needed", ((3.0, 15.0),)),)).text
         'usable for heading: in part: 12 s of straight taxi, 20 s needed (at 3 to 15 s)'
+        >>> Usability("inertial", "yes", (), ("several units (ins and ins.1)",)).text
+        'usable for inertial: yes; gives: several units (ins and ins.1)'
         """
         lacking = "; ".join(f"{one.text}{_where(one.spans_s)}" for one in self.shortfalls)
-        return f"usable for {self.purpose}: {self.state}{f': {lacking}' if lacking else ''}"
+        besides = f"; gives: {'; '.join(self.gives)}" if self.gives else ""
+        return f"usable for {self.purpose}: {self.state}{f': {lacking}' if lacking else ''}{besides}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         lacking = [{"text": one.text, "spans_s": [list(span) for span in one.spans_s]} for one in self.shortfalls]
-        return {"purpose": self.purpose, "state": self.state, "lacking": lacking}
+        besides = {"gives": list(self.gives)} if self.gives else {}
+        return {"purpose": self.purpose, "state": self.state, "lacking": lacking, **besides}
 
 
 def usability_from(told: Mapping[str, Any]) -> Usability:
@@ -69,7 +76,7 @@ def usability_from(told: Mapping[str, Any]) -> Usability:
     lacking = (
         Shortfall(one["text"], tuple((float(a), float(b)) for a, b in one["spans_s"])) for one in told["lacking"]
     )
-    return Usability(told["purpose"], told["state"], tuple(lacking))
+    return Usability(told["purpose"], told["state"], tuple(lacking), tuple(told.get("gives", ())))
 
 
 def require_purpose(name: str) -> None:
@@ -115,17 +122,19 @@ def usability_of_session(
     found = _examined(analysis, assembled.session, known)
     shortfalls = (*found.shortfalls, *told)
     state = "in part" if found.state == "yes" and shortfalls else found.state
-    return Usability(purpose, state, shortfalls)
+    return Usability(purpose, state, shortfalls, found.gives)
 
 
 def _examined(analysis: Analysis, data: Any, known: Any) -> Usability:
     assert analysis.examine is not None
+    settings = known.settings[analysis.settings_table]
+    gives = analysis.gives(data, known, settings)
     try:
-        found = analysis.examine(data, known, known.settings[analysis.settings_table])
+        found = analysis.examine(data, known, settings)
     except (NotAssessableError, SettingsError) as error:
         reason = str(error).removeprefix(f"{analysis.name}: ")
-        return Usability(analysis.name, "no", (Shortfall(reason),))
-    return Usability(analysis.name, "in part" if found else "yes", found)
+        return Usability(analysis.name, "no", (Shortfall(reason),), gives)
+    return Usability(analysis.name, "in part" if found else "yes", found, gives)
 
 
 def _shortfalls(findings: Sequence[Finding]) -> tuple[Shortfall, ...]:

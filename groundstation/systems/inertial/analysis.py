@@ -11,10 +11,11 @@ from groundstation.methods.roles import InsKinds
 from groundstation.results.answer import Answers, answer_of
 from groundstation.systems.analysis import Analysis, Found, RestsOn, Shortfall, main_numbers
 from groundstation.systems.inertial.answer import InertialResult
-from groundstation.systems.inertial.columns import FORECAST_COLUMNS, INERTIAL_COLUMNS
+from groundstation.systems.inertial.columns import FORECAST_COLUMNS, INERTIAL_COLUMNS, UNITS_COLUMNS
 from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.systems.inertial.judged_answer import judged_filter
 from groundstation.systems.inertial.settings import InertialSettings
+from groundstation.systems.inertial.units_answer import UnitsResult
 from groundstation.systems.known import AircraftData, Known
 from groundstation.tables.phases import Phases
 
@@ -60,6 +61,35 @@ def _examine(flight: "Flight", known: Known, settings: InertialSettings) -> tupl
     from groundstation.systems.inertial.examine import examine_inertial
 
     return examine_inertial(flight, known, settings)
+
+
+def _gives(flight: "Flight", known: Known, settings: InertialSettings) -> tuple[str, ...]:
+    from groundstation.systems.inertial.examine import given_by
+
+    return given_by(flight, known, settings)
+
+
+def _run_units(flight: "Flight", known: Known, settings: InertialSettings) -> Found[UnitsResult]:
+    from groundstation.systems.inertial.units_findings import compare_units
+
+    return Found(*compare_units(flight, known, settings))
+
+
+def _has_several_units(flight: "Flight", _known: Known) -> bool:
+    from groundstation.systems.inertial.units_log import unit_topics
+
+    return len(unit_topics(flight)) > 1
+
+
+def _units_rest_on(flight: "Flight", result: UnitsResult) -> RestsOn:
+    topics = (*(one.topic for one in result.units), *((result.against,) if result.against in flight else ()))
+    times = [flight.time_s(topic) for topic in topics]
+    return RestsOn(topics, FIELDS, ((min(float(one[0]) for one in times), max(float(one[-1]) for one in times)),))
+
+
+def _units_sentence(answers: Answers) -> str:
+    units = answer_of(answers, UnitsResult)
+    return "" if units is None or units.verdict not in ("off", "one_of") else units.sentence
 
 
 def _ins_kinds(known: Known) -> InsKinds:
@@ -154,6 +184,7 @@ INERTIAL = Analysis(
     check=_check,
     columns=INERTIAL_COLUMNS,
     examine=_examine,
+    gives=_gives,
     offers={InsKinds: _ins_kinds},
     is_main=main_numbers(
         r"kind|radial_error_rate_(fit|\d\d)_nmiph|velocity_error_rms_mps|azimuth\.error_deg"
@@ -174,4 +205,20 @@ FORECAST = Analysis(
     is_expected=_is_forecast_expected,
     columns=FORECAST_COLUMNS,
     is_main=_is_main_of_forecast,
+)
+UNITS = Analysis(
+    name="units",
+    title="several INS of one flight: each against GNSS, in pairs, and which one is off",
+    subject="several INS",
+    needs="two INS or more; GNSS or the best trajectory tells which is off, else three units do",
+    settings=InertialSettings,
+    answer=UnitsResult,
+    run=_run_units,
+    table="inertial",
+    builds_on=("inertial", "trajectory"),
+    applies=_has_several_units,
+    rests_on=_units_rest_on,
+    sentence=_units_sentence,
+    columns=UNITS_COLUMNS,
+    is_main=main_numbers(r"verdict|units\.[^.]+\.(rate_fit_nmiph|velocity_rms_mps)\.value"),
 )

@@ -3,6 +3,7 @@
 from groundstation.results.columns import AnswerColumn
 from groundstation.systems.inertial.answer import InertialResult
 from groundstation.systems.inertial.forecast_answer import ForecastResult
+from groundstation.systems.inertial.units_answer import UnitsResult
 
 INERTIAL_COLUMNS: tuple[AnswerColumn[InertialResult], ...] = (
     AnswerColumn("ins_kind", "category", "unaided, gnss_aided or unknown", lambda inertial: inertial.kind),
@@ -36,4 +37,29 @@ FORECAST_COLUMNS: tuple[AnswerColumn[ForecastResult], ...] = (
     ),
     AnswerColumn("forecast_60min_rms_m", "number", "after 60 min", lambda forecast: _rms_m(forecast, 60.0)),
     AnswerColumn("forecast_120min_rms_m", "number", "after 120 min", lambda forecast: _rms_m(forecast, 120.0)),
+)
+UNITS_COLUMNS: tuple[AnswerColumn[UnitsResult], ...] = (
+    AnswerColumn(
+        "units_verdict",
+        "category",
+        "of several INS: agree, off, one_of, not_judged",
+        lambda units: units.verdict,
+        is_indexed=False,
+    ),
+    AnswerColumn(
+        "units_off",
+        "text",
+        "INS that are off, or one of which is",
+        lambda units: ", ".join(units.off),
+        is_indexed=False,
+    ),
+    AnswerColumn(
+        "units_rates_nmiph",
+        "text",
+        "radial error rate of each INS by the time-position fit",
+        lambda units: ", ".join(
+            f"{one.topic} {one.rate_fit_nmiph.value:.2f}" for one in units.units if one.rate_fit_nmiph is not None
+        ),
+        is_indexed=False,
+    ),
 )

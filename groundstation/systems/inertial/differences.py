@@ -99,11 +99,16 @@ class InsDifferences:
 
 
 def differences(
-    flight: Flight, *, settings: InertialSettings, excluded_s: tuple[tuple[float, float], ...] = ()
+    flight: Flight,
+    *,
+    settings: InertialSettings,
+    excluded_s: tuple[tuple[float, float], ...] = (),
+    ins_topic: str = "",
 ) -> InsDifferences:
     """Compare INS and GNSS of a flight.
 
-    GNSS samples are averaged over ``epoch_interval_s`` after the INS has been interpolated to each of them; epochs with
+    The INS is the one named, else the first that has what is needed. GNSS samples are averaged over
+    ``epoch_interval_s`` after the INS has been interpolated to each of them; epochs with
     INS alone stand in the gaps of GNSS.
 
     Raises
@@ -111,8 +116,8 @@ def differences(
     NotAssessableError
         With the reason: no INS, no GNSS, or less GNSS than ``least_gnss_s``.
     """
-    ins_topic, gnss_topic = choose_pair(flight, POSITIONS)
-    ins, realigned_ns = _navigating(flight[ins_topic].unique_times())
+    ins_topic, gnss_topic = choose_pair(flight, POSITIONS, ins_topic)
+    ins, realigned_ns = navigating(flight[ins_topic].unique_times())
     gnss = flight[gnss_topic].unique_times()
     if not len(ins):
         raise NotAssessableError("inertial", f"{ins_topic} never left alignment")
@@ -200,8 +205,8 @@ def _astride(gnss_ns: Int64Array, ins_ns: Int64Array, reset_ns: Int64Array) -> B
     return mask
 
 
-def _navigating(ins: Table) -> tuple[Table, Int64Array]:
-    """The samples in which the INS navigates: not while it aligns, not those it calls invalid.
+def navigating(ins: Table) -> tuple[Table, Int64Array]:
+    """Return the samples in which the INS navigates: not while it aligns, not those it calls invalid.
 
     With the times at which it took up navigating again: it may come back with other errors.
     """

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from groundstation.systems.inertial.analysis import FORECAST, INERTIAL
+from groundstation.systems.inertial.analysis import FORECAST, INERTIAL, UNITS
 from groundstation.systems.system import FleetTab, InFleet, Study, System, Tab
 
 if TYPE_CHECKING:
@@ -20,9 +20,12 @@ def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.systems.inertial.chapter import SOURCES, inertial
     from groundstation.systems.inertial.forecast_answer import ForecastResult
     from groundstation.systems.inertial.forecast_chapter import forecast
+    from groundstation.systems.inertial.units_answer import UnitsResult
+    from groundstation.systems.inertial.units_chapter import units
 
     return (
         Chapter((InertialResult,), inertial, sources=SOURCES),
+        Chapter((UnitsResult,), units),
         Chapter((ForecastResult,), forecast, sources=SOURCES),
     )
 
@@ -67,8 +70,9 @@ def _advice() -> "Adviser":
 def _plots() -> "Mapping[str, Describe]":
     from groundstation.systems.inertial import forecast_plots as forecast
     from groundstation.systems.inertial import plots as inertial
+    from groundstation.systems.inertial import units_plots as units
 
-    return {**forecast.PLOTS, **inertial.PLOTS}
+    return {**forecast.PLOTS, **inertial.PLOTS, **units.PLOTS}
 
 
 def _compared() -> "tuple[Compared, ...]":
@@ -80,9 +84,11 @@ def _compared() -> "tuple[Compared, ...]":
 def _tabs() -> tuple[Tab, ...]:
     from groundstation.systems.inertial.forecast_tab import forecast
     from groundstation.systems.inertial.tab import inertial
+    from groundstation.systems.inertial.units_tab import units
 
     return (
         Tab(("inertial",), inertial),
+        Tab(("units",), units),
         Tab(("forecast",), forecast),
     )
 
@@ -107,7 +113,7 @@ def _outcome_units() -> type:
 
 SYSTEM = System(
     name="inertial",
-    analyses=(INERTIAL, FORECAST),
+    analyses=(INERTIAL, FORECAST, UNITS),
     studies=(
         Study(
             "forecast",

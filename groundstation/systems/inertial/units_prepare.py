@@ -259,7 +259,10 @@ def _whose(seen: list[tuple[Jump, str, str]], tracks: dict[str, OnGrid]) -> list
         at_s = left[0][0].time_s
         group = [one for one in left if one[0].time_s - at_s <= SAME_TIME_S]
         left = left[len(group) :]
-        common = set.intersection(*({first, second} for _, first, second in group)) - {""}
+        common = set.intersection(*({first, second} for _, first, second in group))
+        if common == {""}:  # all units against the reference: it jumps, not they
+            continue
+        common -= {""}
         jump, first, second = max(group, key=lambda one: one[0].size.value)
         told = sorted(common) or sorted({first, second} - {""})
         by = "by the others" if len(group) > 1 else "by the reference" if "" in (first, second) else ""
