@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from groundstation.base.serial import from_json, to_json_exactly
+from groundstation.base.units import M_PER_NAUTICAL_MILE
 from groundstation.pipeline.verbs.synthesis import KeptRuns
 from groundstation.simulation.ins_units.family import BAD_INPUTS, BROKEN, FAULT_CASES, healthy_flight
 from groundstation.simulation.ins_units.flight import simulate_units
@@ -130,6 +131,22 @@ def test_a_judged_flight_names_what_was_put_in() -> None:
     assert not healthy.is_called and not healthy.faulty
     rates = [cell for cell in healthy.cells if cell.quantity == "rate_fit_nmiph"]
     assert len(rates) == 3 and all(0.0 < abs(cell.error) < 0.1 for cell in rates)
+
+
+def test_the_truth_of_the_table_is_that_of_the_simulated_errors() -> None:
+    """The figures that the intervals are held against, computed here from the errors themselves."""
+    settings = replace(healthy_flight(SEED, 1), duration_s=3600.0, outages=(), states_start=True)
+    flight = simulate_units(settings, SEED, 1)
+    true = tracks_of(flight).judged(truth_track(flight))
+    hours = flight.time_s / 3600.0
+    for unit, simulated in zip(true.units, flight.units, strict=True):
+        radial_nmi = np.hypot(*simulated.errors.position_m.T) / M_PER_NAUTICAL_MILE
+        assert unit.rate_fit_nmiph is not None and unit.velocity_rms_mps is not None and unit.largest_m is not None
+        rate = np.sum(hours * radial_nmi) / np.sum(hours**2)
+        assert unit.rate_fit_nmiph.value == pytest.approx(rate, rel=0.01, abs=1e-3)
+        rms = np.sqrt(np.mean(np.sum(simulated.errors.velocity_mps**2, axis=1)))
+        assert unit.velocity_rms_mps.value == pytest.approx(rms, rel=0.01, abs=2e-3)
+        assert unit.largest_m.value == pytest.approx(radial_nmi.max() * M_PER_NAUTICAL_MILE, rel=0.01, abs=1.0)
 
 
 @pytest.mark.slow
