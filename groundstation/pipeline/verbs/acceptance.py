@@ -38,10 +38,13 @@ from groundstation.systems import systems
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.inertial.answer import InertialResult
 from groundstation.systems.inertial.arrays import InertialStates, InertialTrack
+from groundstation.systems.inertial.units_answer import InsUnit, UnitsResult
+from groundstation.systems.inertial.units_arrays import UnitsErrors
 
 STANDARDS = ShippedToml("groundstation.methods.fleet", "standards", "standard")
 STATES, TRACK = "inertial_states", "inertial_track"
 NOT_STATED = "not stated"
+SERIAL_CHANGES = "its serial changes in flight: the errors of two INS"
 RESET, REALIGNED = "inertial.ins_reset", "inertial.realigned"
 
 
@@ -69,7 +72,7 @@ def accept(out: Path, standard: str) -> Acceptance:
     """
     limits, file = read_standard(standard)
     folders = saved_flights(out)
-    found = _without_twins([_flight_of(folder, limits) for folder in folders])
+    found = _without_twins([one for folder in folders for one in _units_of(folder, limits)])
     flights = [flight for flight, _, _ in found]
     kept = [(flight, errors) for flight, errors, _ in found if flight.is_included and errors is not None]
     included, errors = [flight for flight, _ in kept], [one for _, one in kept]
@@ -132,32 +135,89 @@ def flights_figure(found: Acceptance) -> FigureData:
     return FigureData("flights", columns, {"hours": 4})
 
 
-def _flight_of(folder: Path, standard: Standard) -> tuple[FlightError, PositionErrors | None, Mapping[str, Any]]:
-    """Errors of one flight, or why it is left out.
+def _units_of(folder: Path, standard: Standard) -> list["Found"]:
+    """Errors of each INS of one flight, or why it is left out.
 
     With them come the settings that its errors were found with.
     """
     try:
         saved = load(folder, systems().answer_types)
-        return _errors_of(saved, standard)
+        return [_errors_of(saved, standard), *_errors_of_others(saved, standard)]
     except GroundstationError as error:
         reason = f"cannot be read: {error}"
-        return FlightError(folder.name, "", "", "", None, "", "", "", reason, is_read=False), None, {}
+        return [(FlightError(folder.name, "", "", "", None, "", "", "", reason, is_read=False), None, {})]
+
+
+def _errors_of_others(saved: SavedFlight, standard: Standard) -> list["Found"]:
+    """Errors of the INS of a flight beside the one of the chapter on INS errors.
+
+    Not of the filters of an autopilot, which GNSS corrects.
+    """
+    units, inertial = saved.results.answer(UnitsResult), saved.results.answer(InertialResult)
+    if units is None or inertial is None:
+        return []
+    others = [
+        one for one in units.units if one.topic != inertial.ins_topic and (one.kind != "gnss_aided" or one.serials)
+    ]
+    return [_errors_of_unit(saved, units, one, inertial, standard) for one in others]
+
+
+def _errors_of_unit(
+    saved: SavedFlight, units: UnitsResult, unit: InsUnit, inertial: InertialResult, standard: Standard
+) -> "Found":
+    flight = replace(_named(saved, unit.topic), ins=_unit_of(saved, unit.topic))
+    reason = _unit_not_judged(units, unit)
+    try:
+        rows = saved.rows_of(UnitsErrors)
+    except MissingColumnError:
+        rows = None
+    if not reason and rows is None:
+        reason = "its arrays are of an older version: run the log again"
+    if reason or rows is None or unit.start_s is None:
+        return replace(flight, reason=reason), None, {}
+    mine = rows.where(rows.unit == unit.topic)
+    errors = ins_errors(
+        *(mine.time_s, mine.north_m, mine.east_m, mine.latitude_deg, mine.longitude_deg), start_s=unit.start_s
+    )
+    if errors is None or np.ptp(errors.hours) * 60.0 < standard.minutes_min:
+        return replace(flight, reason=f"less than {standard.minutes_min:g} min of navigation compared"), None, {}
+    hours = float(errors.hours[-1])
+    velocity = unit.velocity_rms_mps
+    flight = replace(
+        flight,
+        hours=hours,
+        epochs=len(errors.hours),
+        values=errors.values() | ({} if velocity is None else {"velocity_error_rms_mps": velocity.value}),
+        reference95=_reference95(inertial, None, hours),
+    )
+    return _sure_enough(flight, standard), errors, inertial.settings | {"ins_class": units.ins_class}
+
+
+def _unit_not_judged(units: UnitsResult, unit: InsUnit) -> str:
+    """Reason why another INS of a flight does not count; empty where it does."""
+    if unit.same_as:
+        return f"it repeats {unit.same_as}"
+    if len(unit.serials) > 1:
+        return SERIAL_CHANGES
+    if not unit.has_position:
+        return "it logs no position"
+    if unit.kind != "unaided":
+        return "GNSS corrects it" if unit.kind == "gnss_aided" else "GNSS may correct it"
+    if any(one.kind == "step" and one.topics == (unit.topic,) and one.unit == "m" for one in units.faults):
+        return "the position of the INS was set in flight"
+    if any(one.kind == "frozen" and one.topics == (unit.topic,) for one in units.faults):
+        return "its outputs stood still in flight"
+    return "" if unit.start_s is not None else "nothing shows when navigation began"
 
 
 def _errors_of(saved: SavedFlight, standard: Standard) -> tuple[FlightError, PositionErrors | None, Mapping[str, Any]]:
     results, inertial = saved.results, saved.results.answer(InertialResult)
-    flight = FlightError(
-        saved.folder.name,
-        _unit_of(saved, inertial.ins_topic if inertial else ""),
-        results.metadata.get("aircraft", ""),
-        _said(saved, "ins_alignment") or NOT_STATED,
-        results.start_utc_ns,
-        results.source.name,
-        results.source.sha256,
-        saved.manifest.groundstation,
-    )
+    flight = _named(saved, inertial.ins_topic if inertial else "")
     reason = _not_judged(saved, inertial)
+    units = results.answer(UnitsResult)
+    if not reason and units is not None and inertial is not None:
+        changed = [one for one in units.units if one.topic == inertial.ins_topic and len(one.serials) > 1]
+        reason = SERIAL_CHANGES if changed else ""
     start = None if inertial is None or reason else inertial.navigation_start
     if inertial is None or start is None or start.time_s is None:
         return replace(flight, reason=reason), None, {}
@@ -183,6 +243,20 @@ def _errors_of(saved: SavedFlight, standard: Standard) -> tuple[FlightError, Pos
     )
     flight = replace(flight, reference95=_reference95(inertial, heading, flight.hours))
     return _sure_enough(flight, standard), errors, inertial.settings | {"ins_class": inertial.ins_class}
+
+
+def _named(saved: SavedFlight, topic: str) -> FlightError:
+    results = saved.results
+    return FlightError(
+        saved.folder.name,
+        _unit_of(saved, topic),
+        results.metadata.get("aircraft", ""),
+        _said(saved, "ins_alignment") or NOT_STATED,
+        results.start_utc_ns,
+        results.source.name,
+        results.source.sha256,
+        saved.manifest.groundstation,
+    )
 
 
 def _rows_of(saved: SavedFlight) -> tuple[InertialStates | None, InertialTrack | None]:
@@ -262,7 +336,11 @@ def _unit_of(saved: SavedFlight, topic: str) -> str:
 
     Where neither is known it may be any.
     """
-    serial = _said(saved, "ins_serial")
+    units = saved.results.answer(UnitsResult)
+    known = {} if units is None else {one.topic: one.serials for one in units.units}
+    if known.get(topic):
+        return known[topic][0]
+    serial = _said(saved, "ins_serial") if topic not in known else ""
     if serial:
         return serial
     aircraft = saved.results.metadata.get("aircraft", "")
@@ -279,11 +357,11 @@ Found = tuple[FlightError, PositionErrors | None, Mapping[str, Any]]
 
 
 def _without_twins(found: list[Found]) -> list[Found]:
-    """The same with a second flight of one log left out."""
+    """The same with a second flight of one log left out; its INS are of one flight."""
     first: dict[str, str] = {}
     kept: list[Found] = []
     for flight, errors, settings in found:
-        if flight.is_included and flight.sha256 in first:
+        if flight.is_included and first.get(flight.sha256, flight.flight_id) != flight.flight_id:
             kept.append((replace(flight, reason=f"the same log as {first[flight.sha256]}"), None, settings))
             continue
         if flight.is_included:

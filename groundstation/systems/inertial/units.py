@@ -142,7 +142,7 @@ def _unit(one: Prepared, state: UnitState, judged: Judged | None) -> InsUnit:
         has_position=bool(np.isfinite(track.latitude_deg).any()),
         state=state,
         serials=tuple(serial for _, serial in track.serials),
-        is_start_known=track.start_s is not None,
+        start_s=track.start_s,
         compared_hours=None if growth is None else growth.hours,
         rate_fit_nmiph=size_of(growth, "rate_nmiph"),
         rate_50_nmiph=None if growth is None or track.start_s is None else growth.rate_50_nmiph,

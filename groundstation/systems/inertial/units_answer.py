@@ -75,8 +75,8 @@ class InsUnit:
     kind, kind_reason : str
         As of :class:`groundstation.systems.inertial.answer.InertialResult`.
     has_position : bool
-    is_start_known : bool
-        Whether the start of navigation is proven; else the rate is the growth of the error inside the log.
+    start_s : float or None
+        When navigation began, flight seconds; None where nothing proves it: the rate is then the growth inside the log.
     compared_hours : float or None
         Hours from the start of navigation, or of the log, to the last comparison with the reference.
     rate_fit_nmiph : Measured or None
@@ -106,7 +106,7 @@ class InsUnit:
     has_position: bool
     state: UnitState = field(metadata={"one_of": UNIT_STATES})
     serials: tuple[str, ...] = ()
-    is_start_known: bool = False
+    start_s: float | None = None
     compared_hours: float | None = None
     rate_fit_nmiph: Measured | None = None
     rate_50_nmiph: float | None = None

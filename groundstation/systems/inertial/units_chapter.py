@@ -1,9 +1,12 @@
 """Chapter on several INS of one flight: table by unit, table of pairs, radial errors."""
 
+from collections.abc import Callable, Sequence
+from typing import Any
+
 from groundstation.base.words import listed
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Cell, Claim, Figure, Grid, Head, Mark, Note, Part, Rank, Section, kept
-from groundstation.chapters.wording import ABSENT, clock, number, percent, typeset, with_full_stop
+from groundstation.chapters.wording import ABSENT, clock, number, percent, typeset
 from groundstation.results.flight import FlightResults
 from groundstation.systems.inertial.units_answer import InsPair, InsUnit, Measured, UnitsResult
 
@@ -41,17 +44,13 @@ def units(results: FlightResults) -> Section | None:
         return without_answer(results, "units", TITLE, LEAD)
     tone = CLAIMS[answer.verdict].tone
     parts: tuple[Part | None, ...] = (
-        Note(with_full_stop(_capital(typeset(answer.sentence))), tone),
+        Note(f"{typeset(answer.sentence)}.", tone),
         *_remarks(answer),
         _table(answer),
         _pairs(answer),
         Figure("units.radial"),
     )
     return Section("units", TITLE, LEAD, kept(parts), _headline(answer), claim=_claim(answer))
-
-
-def _capital(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:]}" if not text.startswith("ins") else text
 
 
 def _headline(answer: UnitsResult) -> str:
@@ -61,7 +60,14 @@ def _headline(answer: UnitsResult) -> str:
 def _claim(answer: UnitsResult) -> Claim:
     is_found = answer.verdict in ("off", "one_of")
     rank = Rank.INERTIAL if is_found else Rank.OTHER
-    return Claim(rank, CLAIMS[answer.verdict], _headline(answer), sentences=(with_full_stop(typeset(answer.sentence)),))
+    return Claim(
+        rank,
+        CLAIMS[answer.verdict],
+        _headline(answer),
+        ", ".join(answer.off),
+        "off" if answer.verdict == "off" else "one is off",
+        (f"{typeset(answer.sentence)}.",),
+    )
 
 
 def _remarks(answer: UnitsResult) -> list[Note]:
@@ -81,73 +87,95 @@ def _measured(value: Measured | None, places: int, unit: str = "") -> str:
 
 
 def _table(answer: UnitsResult) -> Grid:
-    heads = (
-        *(Head("Unit"), Head("Kind"), Head("Rate by fit, nmi/h", True), Head("Over time 50 / 95 %, nmi/h", True)),
-        *(Head("Velocity RMS, m/s", True), Head("Schuler amplitude, m/s", True), Head("Largest error, m", True)),
-        *(Head("Heading, °", True), Head("Clock, s", True), Head("")),
+    against = (
+        f"Against {answer.against_title}. " if answer.against else "No GNSS and no trajectory to hold them against. "
     )
-    against = answer.against_title or "nothing: there is no GNSS and no trajectory"
     caption = (
-        f"Against {against}. ± is half of the 95 % interval of the measurement, left out where it rounds to nothing. "
+        f"{against}± is half of the 95 % interval of the measurement, left out where it rounds to nothing. "
         "A rate marked * is the growth inside the log: nothing shows when navigation began. Heading: less that of the "
         "trajectory. Clock: later (+) than the unit by which clocks are set, taken off."
     )
-    return Grid("Units", heads, [_row(unit) for unit in answer.units], caption)
+    return _grid("Units", UNIT_COLUMNS, answer.units, caption)
 
 
-def _row(unit: InsUnit) -> tuple[Cell, ...]:
-    rate = _measured(unit.rate_fit_nmiph, 2)
-    over_time = f"{number(unit.rate_50_nmiph, 2)} / {number(unit.rate_95_nmiph, 2)}"
-    largest = _measured(unit.largest_m, 0)
-    at = "" if unit.largest_at_s is None else f" at {clock(unit.largest_at_s)}"
-    mark = MARKS[unit.state]
-    if unit.same_as:
-        mark = Mark(mark.tone, f"Repeats {unit.same_as}")
+def _name(unit: InsUnit) -> Cell:
     name = f"{unit.topic} ({', '.join(unit.serials)})" if unit.serials else unit.topic
-    return (
-        name if unit.has_position else f"{name}, no position",
-        unit.kind.replace("_", "-"),
-        rate if unit.is_start_known or rate == ABSENT else f"{rate} *",
-        ABSENT if unit.rate_50_nmiph is None else over_time,
-        _measured(unit.velocity_rms_mps, 2),
-        _measured(unit.schuler_mps, 2),
-        f"{largest}{at}",
-        number(unit.heading_difference_deg, 2, signed=True),
-        ABSENT
-        if unit.lag_s is None
-        else f"{number(unit.lag_s.value, 2, signed=True)} ± {number(unit.lag_s.half95, 2)}",
-        mark,
-    )
+    return name if unit.has_position else f"{name}, no position"
+
+
+def _state(unit: InsUnit) -> Cell:
+    mark = MARKS[unit.state]
+    return Mark(mark.tone, f"Repeats {unit.same_as}") if unit.same_as else mark
+
+
+def _rate(unit: InsUnit) -> Cell:
+    rate = _measured(unit.rate_fit_nmiph, 2)
+    return rate if unit.start_s is not None or rate == ABSENT else f"{rate} *"
+
+
+def _over_time(unit: InsUnit) -> Cell:
+    if unit.rate_50_nmiph is None:
+        return ABSENT
+    return f"{number(unit.rate_50_nmiph, 2)} / {number(unit.rate_95_nmiph, 2)}"
+
+
+def _largest(unit: InsUnit) -> Cell:
+    at = "" if unit.largest_at_s is None else f" at {clock(unit.largest_at_s)}"
+    return f"{_measured(unit.largest_m, 0)}{at}"
+
+
+def _clock(unit: InsUnit) -> Cell:
+    lag = unit.lag_s
+    return ABSENT if lag is None else f"{number(lag.value, 3, signed=True)} ± {number(lag.half95, 3)}"
+
+
+UNIT_COLUMNS: tuple[tuple[Head, Callable[[InsUnit], Cell]], ...] = (
+    (Head("Unit"), _name),
+    (Head(""), _state),
+    (Head("Kind"), lambda unit: unit.kind.replace("_", "-")),
+    (Head("Rate by fit, nmi/h", True), _rate),
+    (Head("Over time 50 / 95 %, nmi/h", True), _over_time),
+    (Head("Velocity RMS, m/s", True), lambda unit: _measured(unit.velocity_rms_mps, 2)),
+    (Head("Schuler amplitude, m/s", True), lambda unit: _measured(unit.schuler_mps, 2)),
+    (Head("Largest error, m", True), _largest),
+    (Head("Heading, °", True), lambda unit: number(unit.heading_difference_deg, 2, signed=True)),
+    (Head("Clock, s", True), _clock),
+)
+
+
+def _grid(title: str, columns: Sequence[tuple[Head, Callable[[Any], Cell]]], rows: Sequence[Any], caption: str) -> Grid:
+    """Return a table without the columns in which nothing is known."""
+    cells = [[cell(row) for row in rows] for _, cell in columns]
+    kept_columns = [place for place, column in enumerate(cells) if any(cell != ABSENT for cell in column)]
+    heads = [columns[place][0] for place in kept_columns]
+    return Grid(title, heads, [[cells[place][row] for place in kept_columns] for row in range(len(rows))], caption)
 
 
 def _pairs(answer: UnitsResult) -> Grid:
-    heads = (
-        *(Head("Pair"), Head("Hours", True), Head("Rate, nmi/h", True), Head("Limit", True)),
-        *(Head("Velocity RMS, m/s", True), Head("Limit", True), Head("Schuler amplitude, m/s", True)),
-        *(Head("Largest distance, m", True), Head("Heading, °", True), Head("")),
-    )
     origin = f" ({answer.ins_class_origin})" if answer.ins_class_origin else ""
     caption = (
         f"Limits: what two honest units of the class {answer.ins_class}{origin} exceed in "
         f"{percent(answer.false_alarm_share, 1)} of simulated flights of this length, Schuler oscillation and all; "
         "steps and outputs that stand still are taken out before."
     )
-    return Grid("Pairs", heads, [_pair_row(pair) for pair in answer.pairs], caption)
+    return _grid("Pairs", PAIR_COLUMNS, answer.pairs, caption)
 
 
-def _pair_row(pair: InsPair) -> tuple[Cell, ...]:
-    mark = Mark("unknown", pair.why_not[:1].upper() + pair.why_not[1:])
-    if not pair.why_not:
-        mark = Mark("warn", "Beyond") if pair.is_beyond else Mark("good", "Within")
-    return (
-        f"{pair.second} − {pair.first}",
-        number(pair.hours, 2),
-        number(pair.rate_fit_nmiph, 2),
-        number(pair.rate_limit_nmiph, 2),
-        number(pair.velocity_rms_mps, 2),
-        number(pair.velocity_limit_mps, 2),
-        number(pair.schuler_mps, 2),
-        number(pair.largest_m, 0),
-        number(pair.heading_difference_deg, 2, signed=True),
-        mark,
-    )
+def _pair_state(pair: InsPair) -> Cell:
+    if pair.why_not:
+        return Mark("unknown", pair.why_not[:1].upper() + pair.why_not[1:])
+    return Mark("warn", "Beyond") if pair.is_beyond else Mark("good", "Within")
+
+
+PAIR_COLUMNS: tuple[tuple[Head, Callable[[InsPair], Cell]], ...] = (
+    (Head("Pair"), lambda pair: f"{pair.second} − {pair.first}"),
+    (Head(""), _pair_state),
+    (Head("Hours", True), lambda pair: number(pair.hours, 2)),
+    (Head("Rate, nmi/h", True), lambda pair: number(pair.rate_fit_nmiph, 2)),
+    (Head("Limit", True), lambda pair: number(pair.rate_limit_nmiph, 2)),
+    (Head("Velocity RMS, m/s", True), lambda pair: number(pair.velocity_rms_mps, 2)),
+    (Head("Limit", True), lambda pair: number(pair.velocity_limit_mps, 2)),
+    (Head("Schuler amplitude, m/s", True), lambda pair: number(pair.schuler_mps, 2)),
+    (Head("Largest distance, m", True), lambda pair: number(pair.largest_m, 0)),
+    (Head("Heading, °", True), lambda pair: number(pair.heading_difference_deg, 2, signed=True)),
+)

@@ -29,13 +29,17 @@ def figures_of(found: Comparable) -> tuple[FigureData, ...]:
 def _errors(found: Comparable, rows: Int64Array) -> UnitsErrors:
     reference = found.reference
     assert reference is not None
+    apart = [apart_m(one.raw, reference)[rows] for one in found.units]
+    speeds = [_length(one.raw.velocity_mps - reference.velocity_mps)[rows] for one in found.units]
     return UnitsErrors(
         unit=_named([one.topic for one in found.units], rows),
         time_s=np.tile(found.time_s[rows], len(found.units)),
-        radial_m=np.concatenate([_length(apart_m(one.raw, reference))[rows] for one in found.units]),
-        velocity_mps=np.concatenate(
-            [_length(one.raw.velocity_mps - reference.velocity_mps)[rows] for one in found.units]
-        ),
+        north_m=np.concatenate([one[:, 0] for one in apart]),
+        east_m=np.concatenate([one[:, 1] for one in apart]),
+        radial_m=np.concatenate([_length(one) for one in apart]),
+        velocity_mps=np.concatenate(speeds),
+        latitude_deg=np.concatenate([one.raw.latitude_deg[rows] for one in found.units]),
+        longitude_deg=np.concatenate([wrap_180(one.raw.longitude_deg[rows]) for one in found.units]),
     )
 
 

@@ -52,7 +52,7 @@ def _of_unit(unit: InsUnit, serials: tuple[tuple[float, str], ...]) -> list[Find
         found.append(Finding("warn", "units.same", text, unit.topic))
     if unit.lag_s is not None and abs(unit.lag_s.value) > max(LATE_S, 1.5 * unit.lag_s.half95):
         late = "late" if unit.lag_s.value > 0.0 else "early"
-        text = f"its clock is {abs(unit.lag_s.value):.2f} ± {unit.lag_s.half95:.2f} s {late}: taken off"
+        text = f"its clock is {abs(unit.lag_s.value):.3f} ± {unit.lag_s.half95:.3f} s {late}: taken off"
         found.append(Finding("warn", "units.clock", text, unit.topic))
     if not unit.has_position:
         found.append(Finding("info", "units.no_position", "no position: only its velocity is compared", unit.topic))

@@ -14,6 +14,7 @@ MEAN_S = 10.0  # differences are averaged over so long: what is left is not nois
 RATE_FROM_S, S_PER_H = 600.0, 3600.0
 SCHULER_S = 5064.0  # 84.4 min
 LEAST_PERIOD = 0.75  # Schuler periods to tell an oscillation from a growth
+MOSTLY = 0.5  # of the velocity, left by a wave from the start on: it is no tilt
 FEWEST = 12  # means of 10 s
 
 
@@ -44,7 +45,7 @@ class Growth:
     largest_m : Measured or None
     largest_at_s : float or None
     is_drift : bool
-        Whether the difference grows more than it oscillates.
+        Whether a Schuler wave from the start on leaves most of the velocity unexplained: a tilt makes such a wave.
     """
 
     hours: float
@@ -153,14 +154,15 @@ def _of_velocity(time_s: FloatArray, velocity_mps: FloatArray, noise: Noise) -> 
     found: dict[str, object] = {"velocity_mps": Measured(rms, float(half)), "is_drift": _grows(time_s, velocity_mps)}
     if length_s >= LEAST_PERIOD * SCHULER_S:
         turn = 2.0 * np.pi * time_s / SCHULER_S
-        design = np.column_stack([np.ones(len(time_s)), time_s / length_s, np.cos(turn), np.sin(turn)])
+        wave = np.column_stack([np.cos(turn), np.sin(turn)])
+        design = np.column_stack([np.ones(len(time_s)), time_s / length_s, wave])
         fitted = np.linalg.lstsq(design, velocity_mps, rcond=None)[0]
-        amplitude = float(np.sqrt(np.sum(fitted[2:] ** 2)))
         gain = np.linalg.inv(design.T @ design)[2:, 2:]
         spread = noise.velocity_mps * np.sqrt(float(np.max(np.linalg.eigvalsh(gain))) * 2.0 * noise.velocity_s / MEAN_S)
-        found |= {"schuler_mps": Measured(amplitude, float(NORMAL_95 * spread))}
-        steady = np.hypot(*(fitted[0] + fitted[1] * float(np.mean(time_s)) / length_s))
-        found["is_drift"] = bool(steady > 0.5 * amplitude)
+        amplitude = float(np.sqrt(np.sum(fitted[2:] ** 2)))
+        found["schuler_mps"] = Measured(amplitude, float(NORMAL_95 * spread))
+        left = velocity_mps - wave @ np.linalg.lstsq(wave, velocity_mps, rcond=None)[0]
+        found["is_drift"] = bool(np.sqrt(np.mean(np.sum(left**2, axis=1))) > MOSTLY * rms)
     return found
 
 

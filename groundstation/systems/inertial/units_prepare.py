@@ -32,7 +32,7 @@ from groundstation.systems.inertial.units_grid import OnGrid, apart_m, grid_of, 
 from groundstation.systems.inertial.units_track import ReferenceTrack, UnitTrack
 from groundstation.tables.sources import AIDED
 
-BY_POSITION, BY_VELOCITY = "by its own position", "by its own velocity"
+BY_POSITION, BY_VELOCITY = "against its own position", "against its own velocity"
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ def _upright(units: list[Prepared], against: OnGrid | None) -> list[Prepared]:
         if by_itself is not None:
             found[one.topic] = Swapped(by_itself, BY_POSITION, (one.topic,))
         elif by_reference is not None:
-            found[one.topic] = Swapped(by_reference, "by the reference", (one.topic,))
+            found[one.topic] = Swapped(by_reference, "against the reference", (one.topic,))
     left = [one for one in witnesses if one.topic not in found]
     if against is None and len(left) > 1:
         found |= _by_the_others(left)
@@ -170,7 +170,7 @@ def _by_the_others(units: list[Prepared]) -> dict[str, Swapped]:
         seen = [matrix for matrix in told if matrix is not None]
         if len(seen) == len(others):
             topics = (one.topic,) if len(others) > 1 else tuple(unit.topic for unit in units)
-            return {one.topic: Swapped(seen[0], "by the others", topics)}
+            return {one.topic: Swapped(seen[0], "against the others", topics)}
     return {}
 
 
@@ -265,14 +265,14 @@ def _whose(seen: list[tuple[Jump, str, str]], tracks: dict[str, OnGrid]) -> list
         common -= {""}
         jump, first, second = max(group, key=lambda one: one[0].size.value)
         told = sorted(common) or sorted({first, second} - {""})
-        by = "by the others" if len(group) > 1 else "by the reference" if "" in (first, second) else ""
+        by = "against the others" if len(group) > 1 else "against the reference" if "" in (first, second) else ""
         if len(told) > 1:
             spikes = sorted(told, key=lambda topic: own_spike(tracks[topic], jump.time_s))
             if own_spike(tracks[spikes[-1]], jump.time_s) > CLEARER * own_spike(tracks[spikes[0]], jump.time_s):
                 told, by = [spikes[-1]], BY_VELOCITY
         sign = -1.0 if told[0] == second else 1.0
         vector = sign * jump.vector[0], sign * jump.vector[1]
-        found.append(Stepped(replace(jump, vector=vector), by or "by two units", tuple(told)))
+        found.append(Stepped(replace(jump, vector=vector), by or "in the difference of two units", tuple(told)))
     return found
 
 

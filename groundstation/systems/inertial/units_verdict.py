@@ -47,7 +47,7 @@ def _held_faults(one: Prepared) -> list[InsFault]:
             "all outputs stand still" if held.is_frozen else f"velocity {listed([AXES[a] for a in held.axes])} sticks"
         )
         text = f"{what} from {clock_text(held.start_s)} for {held.end_s - held.start_s:.0f} s"
-        faults.append(InsFault(kind, (one.topic,), "by the other tracks", text, held.start_s, held.end_s))
+        faults.append(InsFault(kind, (one.topic,), "while the others move", text, held.start_s, held.end_s))
     return faults
 
 
@@ -84,7 +84,11 @@ def growth_faults(
     topics = [one.topic for one in found.witnesses if one.topic not in named]
     who = _by_parity(topics, pairs) if len(topics) > 2 else tuple(left[0].topics)
     worst = max((one for one in left if set(one.topics) & set(who)), key=lambda one: one.over)
-    by = f"by {'three' if len(topics) == 3 else len(topics)} units" if len(topics) > 2 else "by two units"
+    by = (
+        f"by parity of {'three' if len(topics) == 3 else len(topics)} units"
+        if len(topics) > 2
+        else "in the difference of two units"
+    )
     faults.append(_growth_fault(worst, who, by))
     return faults
 
@@ -152,13 +156,8 @@ def sentence_of(
         own = [fault for fault in faults if fault.topics == topics]
         shown = sorted(own, key=lambda fault: fault.kind not in ("drift", "tilt"))
         more = f"; {len(shown) - 3} more" if len(shown) > 3 else ""
-        told = "; ".join(f"{fault.text}{_others(fault, by_reference)} {fault.by}" for fault in shown[:3])
-        one_of = {2: "one of the two"}.get(len(topics), "one or more")
-        who = (
-            f"{topics[0]} is off"
-            if len(topics) == 1
-            else f"{one_of} of {listed(topics)} is off".replace(" of the two of", " of")
-        )
+        told = "; ".join(f"{fault.text}{_others(fault, by_reference)}, {fault.by}" for fault in shown[:3])
+        who = f"{topics[0]} is off" if len(topics) == 1 else f"one of {listed(topics)} is off"
         sentences.append(f"{who}: {told}{more}")
     return "; ".join(sentences)
 
