@@ -207,7 +207,7 @@ FORECAST = Analysis(
     is_main=_is_main_of_forecast,
 )
 UNITS = Analysis(
-    name="units",
+    name="ins_units",
     title="several INS of one flight: each against GNSS, in pairs, and which one is off",
     subject="several INS",
     needs="two INS or more; GNSS or the best trajectory tells which is off, else three units do",

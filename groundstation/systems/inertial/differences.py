@@ -206,7 +206,7 @@ def _astride(gnss_ns: Int64Array, ins_ns: Int64Array, reset_ns: Int64Array) -> B
 
 
 def navigating(ins: Table) -> tuple[Table, Int64Array]:
-    """Return the samples in which the INS navigates: not while it aligns, not those it calls invalid.
+    """Return the samples in which the INS navigates: none of alignment, none invalid.
 
     With the times at which it took up navigating again: it may come back with other errors.
     """

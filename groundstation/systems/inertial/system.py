@@ -88,7 +88,7 @@ def _tabs() -> tuple[Tab, ...]:
 
     return (
         Tab(("inertial",), inertial),
-        Tab(("units",), units),
+        Tab(("ins_units",), units),
         Tab(("forecast",), forecast),
     )
 

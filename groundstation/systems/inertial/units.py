@@ -60,13 +60,13 @@ def judge_units(
     """
     tracks = [one for one in units if len(one.time_s) > 1]
     if len(tracks) < 2:
-        raise NotAssessableError("units", f"{len(tracks)} INS with samples", "two or more")
+        raise NotAssessableError("ins_units", f"{len(tracks)} INS with samples", "two or more")
     limits_class = ins_class if limits_of(ins_class, 1.0, is_start_known=True) is not None else DEFAULT_LIMITS
     found = prepare(tracks, reference)
     by_reference = against_reference(found, _noise(reference), limits_class)
     pairs = in_pairs(found, limits_class)
     if all(one.shown is None for one in (*pairs, *by_reference.values())):
-        raise NotAssessableError("units", "no two units overlap", "two units at the same time")
+        raise NotAssessableError("ins_units", "no two units overlap", "two units at the same time")
     faults = own_faults(found, reference) + growth_faults(found, by_reference, pairs, reference)
     judged = sum(bool(one.ratios) for one in pairs)
     states = _states(found, faults, by_reference, pairs)

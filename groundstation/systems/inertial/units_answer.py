@@ -161,7 +161,7 @@ class UnitsResult(Answer):
         Share of the flights of honest units in which a single limit is exceeded.
     """
 
-    analysis: ClassVar[str] = "units"
+    analysis: ClassVar[str] = "ins_units"
     schema_name: ClassVar[str] = analysis
 
     verdict: Verdict = field(metadata={"one_of": VERDICTS})

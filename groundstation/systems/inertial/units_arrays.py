@@ -1,4 +1,4 @@
-"""Arrays of several units: errors against the reference, and differences of pairs, over time."""
+"""Arrays of several units: errors against the reference, differences of pairs."""
 
 from groundstation.results.arrays.typed import Arrays, Floats, Texts
 

@@ -41,7 +41,7 @@ def units(results: FlightResults) -> Section | None:
     """Return the chapter; None when the flight was not assessed and no reason is known."""
     answer = results.answer(UnitsResult)
     if answer is None:
-        return without_answer(results, "units", TITLE, LEAD)
+        return without_answer(results, "ins_units", TITLE, LEAD)
     tone = CLAIMS[answer.verdict].tone
     parts: tuple[Part | None, ...] = (
         Note(f"{typeset(answer.sentence)}.", tone),
@@ -50,7 +50,7 @@ def units(results: FlightResults) -> Section | None:
         _pairs(answer),
         Figure("units.radial"),
     )
-    return Section("units", TITLE, LEAD, kept(parts), _headline(answer), claim=_claim(answer))
+    return Section("ins_units", TITLE, LEAD, kept(parts), _headline(answer), claim=_claim(answer))
 
 
 def _headline(answer: UnitsResult) -> str:

@@ -25,7 +25,7 @@ FEWEST_SAME, SAME_SHARE, SAME_S = 100, 0.95, 1.0
 
 @dataclass(frozen=True)
 class ClockFit:
-    """Stamps of a second unit: how late they are, and how much later at the end than in the middle."""
+    """Delay of a second unit's stamps in the middle, and how much more at the end."""
 
     late_s: Measured
     more_s: Measured
@@ -145,7 +145,7 @@ def _least_squares(design: FloatArray, target: FloatArray) -> tuple[FloatArray, 
 
 
 def repeats(first: UnitTrack, second: UnitTrack) -> tuple[float, int] | None:
-    """Tell whether a second unit has the numbers of the first; how much later, and in how many rows.
+    """Tell how much later, and in how many rows, a second unit repeats the first.
 
     None where it has its own, or too few numbers that differ from each other, as at rest.
     """

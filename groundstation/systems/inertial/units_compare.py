@@ -1,4 +1,4 @@
-"""Growth of each unit against the reference and of each pair, with the limits of honest units."""
+"""Growth of each unit and each pair beside the limits of honest units."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -38,7 +38,7 @@ Matrix = tuple[tuple[float, float], tuple[float, float]]
 
 @dataclass(frozen=True)
 class Held:
-    """Span of flight seconds in which outputs of a unit stand still while the aircraft goes on.
+    """Span in which outputs of a unit stand still while the aircraft goes on.
 
     ``axes`` are those of the velocity; ``is_frozen`` when the position stands still too.
     """
@@ -51,7 +51,7 @@ class Held:
 
 @dataclass(frozen=True)
 class Jump:
-    """Step of a track at a time: vector north and east, size with its interval, unit ``m`` or ``m/s``."""
+    """Step of a track: vector north and east, size, unit ``m`` or ``m/s``."""
 
     time_s: float
     vector: tuple[float, float]
@@ -87,7 +87,7 @@ def held_spans(track: UnitTrack, others: Sequence[OnGrid]) -> tuple[Held, ...]:
 
 
 def _is_impossible(same: BoolArray, start: int, end: int) -> bool:
-    """Tell whether a unit that repeats values as often as it does elsewhere would not make so long a run."""
+    """Tell whether a unit that repeats values so often would not make so long a run."""
     reach = max(end - start, NEIGHBOURS)
     near = np.concatenate([same[max(start - reach, 1) : start - 1], same[end + 1 : end + reach]])
     elsewhere = np.concatenate([same[1 : start - 1], same[end + 1 :]])
@@ -146,7 +146,7 @@ def without_held(one: OnGrid, spans: Sequence[Held]) -> OnGrid:
 
 
 def axes_of(velocity_mps: FloatArray, true_mps: FloatArray) -> Matrix | None:
-    """Return how the axes of a velocity are exchanged or turned about, by one that is believed.
+    """Return how the axes of a velocity are exchanged, by one that is believed.
 
     None where they are right, or the motion does not tell.
 
@@ -177,7 +177,7 @@ _ORDERS: tuple[Matrix, ...] = tuple(
 
 
 def own_axes(one: OnGrid, step_rows: int = 10) -> Matrix | None:
-    """Return how the axes of a velocity are exchanged by the unit's own position; None where they are right."""
+    """Return how the axes of a velocity are exchanged by the unit's own position."""
     step_s = float(one.time_s[1] - one.time_s[0])
     moved = moved_m(one) / step_s
     count = len(moved) // step_rows * step_rows
@@ -226,7 +226,7 @@ def velocity_jumps(one: OnGrid, other: OnGrid) -> tuple[Jump, ...]:
 
 
 def _jumps(time_s: FloatArray, left: FloatArray, least: float, unit: str, *, sums: bool) -> tuple[Jump, ...]:
-    """Return the lasting steps of a series by its differences from row to row, shape (n - 1, 2)."""
+    """Return the lasting steps of a series by its differences from row to row."""
     size = np.hypot(*left.T)
     known = size[np.isfinite(size)]
     if len(known) < 2 * NEAR:
@@ -282,7 +282,7 @@ def is_near(time_s: float, others_s: Sequence[float], within_s: float = SAME_TIM
 
 
 def without_steps(one: OnGrid, jumps: Sequence[Jump]) -> tuple[FloatArray, BoolArray]:
-    """Return what steps of position have added up to, (n, 2), and the rows before the first step of velocity."""
+    """Return the sum of the steps of position, and the rows before a step of velocity."""
     total = np.zeros((len(one.time_s), 2))
     before = np.ones(len(one.time_s), dtype=bool)
     for jump in jumps:

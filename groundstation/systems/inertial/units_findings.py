@@ -42,26 +42,26 @@ def _of_fault(fault: InsFault) -> Finding:
         place = at if fault.start_s == fault.end_s else f"{fault.start_s:.1f} to {fault.end_s:.1f} s"
     who = "" if len(fault.topics) == 1 else f"one of {listed(fault.topics)}: "
     topic = fault.topics[0] if len(fault.topics) == 1 else ""
-    return Finding("warn", f"units.{fault.kind}", f"{who}{fault.text}, {fault.by}", topic, place)
+    return Finding("warn", f"ins_units.{fault.kind}", f"{who}{fault.text}, {fault.by}", topic, place)
 
 
 def _of_unit(unit: InsUnit, serials: tuple[tuple[float, str], ...]) -> list[Finding]:
     found = []
     if unit.same_as:
         text = f"it repeats {unit.same_as}: the same unit twice, counted once"
-        found.append(Finding("warn", "units.same", text, unit.topic))
+        found.append(Finding("warn", "ins_units.same", text, unit.topic))
     if unit.lag_s is not None and abs(unit.lag_s.value) > max(LATE_S, 1.5 * unit.lag_s.half95):
         late = "late" if unit.lag_s.value > 0.0 else "early"
         text = f"its clock is {abs(unit.lag_s.value):.3f} ± {unit.lag_s.half95:.3f} s {late}: taken off"
-        found.append(Finding("warn", "units.clock", text, unit.topic))
+        found.append(Finding("warn", "ins_units.clock", text, unit.topic))
     if not unit.has_position:
-        found.append(Finding("info", "units.no_position", "no position: only its velocity is compared", unit.topic))
+        found.append(Finding("info", "ins_units.no_position", "no position: only its velocity is compared", unit.topic))
     if unit.kind == AIDED:
         text = f"GNSS corrects it ({unit.kind_reason}): it is no witness against the others"
-        found.append(Finding("info", "units.aided", text, unit.topic))
+        found.append(Finding("info", "ins_units.aided", text, unit.topic))
     for (_, before), (at_s, after) in pairwise(serials):
         text = f"its serial changes from {before} to {after}: its errors are those of two units"
-        found.append(Finding("warn", "units.serial", text, unit.topic, f"at {at_s:.1f} s"))
+        found.append(Finding("warn", "ins_units.serial", text, unit.topic, f"at {at_s:.1f} s"))
     return found
 
 
@@ -79,7 +79,7 @@ def told_by_units(flight: Flight) -> tuple[str, ...]:
         return ()
     names = listed(topics)
     try:
-        gnss = choose_source(flight, GNSS, "units")
+        gnss = choose_source(flight, GNSS, "ins_units")
     except NotAssessableError:
         says = "parity names the one that is off" if len(topics) > 2 else "a difference shows, not which one is off"
         return (f"several units ({names}) without GNSS: {says}",)

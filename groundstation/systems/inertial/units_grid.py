@@ -56,7 +56,7 @@ def grid_of(tracks: Sequence[UnitTrack | ReferenceTrack]) -> FloatArray:
 
 
 def in_time(time_s: FloatArray, grid_s: FloatArray, late_s: float, more_s: float) -> FloatArray:
-    """Return stamps on the common clock: late in the middle of the grid, and more at the end of it."""
+    """Return stamps on the common clock."""
     middle, half = 0.5 * (grid_s[0] + grid_s[-1]), max(0.5 * (grid_s[-1] - grid_s[0]), 1.0)
     return np.asarray(time_s - late_s - more_s * (time_s - late_s - middle) / half)
 
@@ -107,14 +107,14 @@ def apart_m(one: OnGrid, other: OnGrid) -> FloatArray:
 
 
 def heading_apart_deg(one: OnGrid, other: OnGrid) -> float | None:
-    """Return the median of the heading of one less that of another; None where not both have one."""
+    """Return the median of the heading of one less that of another, None without one."""
     apart = wrap_180(one.heading_deg - other.heading_deg)
     known = apart[np.isfinite(apart)]
     return float(np.median(known)) if len(known) else None
 
 
 def moved_m(one: OnGrid) -> FloatArray:
-    """Return how far its position moves from row to row, metres north and east, shape (n - 1, 2)."""
+    """Return how far its position moves from row to row, metres, shape (n - 1, 2)."""
     later = replace(one, **{name: getattr(one, name)[1:] for name in _ROWS})
     earlier = replace(one, **{name: getattr(one, name)[:-1] for name in _ROWS})
     return apart_m(later, earlier)

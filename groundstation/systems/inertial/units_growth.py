@@ -1,4 +1,4 @@
-"""Growth of a difference between two tracks: rate, velocity, Schuler amplitude, with intervals."""
+"""Growth of a difference between two tracks: rate, velocity, Schuler amplitude."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ FEWEST = 12  # means of 10 s
 
 @dataclass(frozen=True)
 class Noise:
-    """Slow error of one axis of the reference: sigma and correlation time of position and velocity."""
+    """Slow error of one axis of the reference: sigmas and correlation times."""
 
     position_m: float = 0.0
     velocity_mps: float = 0.0
@@ -167,7 +167,7 @@ def _of_velocity(time_s: FloatArray, velocity_mps: FloatArray, noise: Noise) -> 
 
 
 def _grows(time_s: FloatArray, velocity_mps: FloatArray) -> bool:
-    """Tell in less than a Schuler period whether the velocity grows faster than a tilt makes it grow.
+    """Tell whether the velocity grows faster than a tilt makes it grow in a short time.
 
     Drift makes it grow with the square of time, tilt with time.
     """

@@ -1,4 +1,4 @@
-"""Limits of honest units: growth that a class exceeds in a stated share of simulated flights.
+"""Limits of honest units: growth exceeded in a stated share of simulated flights.
 
 ``units_limits.toml`` beside this file has them, written by
 ``python -m groundstation.systems.inertial.study.units_limits``.
@@ -45,7 +45,7 @@ def _table() -> dict[str, Any]:
 
 
 def limits_of(ins_class: str, hours: float, *, is_start_known: bool) -> ClassLimits | None:
-    """Return the limits of a class for a length of flight; None for a class that was not simulated.
+    """Return the limits of a class for a length of flight, None for an unknown class.
 
     ``is_start_known`` False: navigation began some unknown time, up to two hours, before the log. Limits of other
     lengths are interpolated, logarithm against logarithm, and held beyond the ends.

@@ -132,14 +132,14 @@ def serials_of(text: str) -> tuple[tuple[float, str], ...]:
 
 
 def unit_reference(flight: Flight, known: Known, noise: InsNoise) -> ReferenceTrack | None:
-    """Return the best trajectory where its checks hold, else GNSS; None where there is neither."""
+    """Return the best trajectory where its checks hold, else GNSS, else None."""
     best = known.answer_meeting(StatesAlongTheFlight)
     if best is not None and best.is_reference:
         states = best.states_at_antenna()
         if states is not None and len(states.time_s) > 1:
             return _by_states(best.states_name, states)
     try:
-        topic = choose_source(flight, GNSS, "units")
+        topic = choose_source(flight, GNSS, "ins_units")
     except NotAssessableError:
         return None
     return _by_gnss(flight, topic, known.excluded_s, noise)

@@ -1,4 +1,4 @@
-"""Plots of several units: radial error of each, or distance of each pair; more for the recording."""
+"""Plots of several units: error of each, difference of each pair."""
 
 from collections.abc import Mapping
 
@@ -24,7 +24,7 @@ TITLES = {
 
 
 def radial(results: FlightResults) -> Plot | None:
-    """Return the radial error of each unit; the distance of each pair where there is no reference."""
+    """Return the radial error of each unit, without a reference the pairs' distances."""
     return _of_units(results, "radial", "units.radial") or _of_pairs(results, "radial", "units.radial")
 
 

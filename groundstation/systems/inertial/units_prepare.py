@@ -89,7 +89,7 @@ class Prepared:
 
     @property
     def topic(self) -> str:
-        """Its topic."""
+        """Topic of the unit."""
         return self.track.topic
 
     @property
@@ -120,7 +120,7 @@ class Comparable:
 
 
 def prepare(tracks: Sequence[UnitTrack], reference: ReferenceTrack | None) -> Comparable:
-    """Bring units and reference to one grid and one clock, and take out what each shows by itself."""
+    """Bring units and reference to one grid and one clock, and take out own faults."""
     grid_s = grid_of(tracks)
     against = None if reference is None else on_grid(reference, grid_s)
     units = [Prepared(track, grid, grid) for track in tracks for grid in (on_grid(track, grid_s),)]
@@ -146,7 +146,7 @@ def _without_copies(units: list[Prepared]) -> list[Prepared]:
 
 
 def _upright(units: list[Prepared], against: OnGrid | None) -> list[Prepared]:
-    """Put exchanged axes right: by the unit's own position, by the reference, else by the others."""
+    """Put exchanged axes right: by own position, by the reference, or by the others."""
     witnesses = [one for one in units if not one.same_as]
     found: dict[str, Swapped] = {}
     for one in witnesses:
@@ -180,7 +180,9 @@ def _turned(one: Prepared, swapped: Swapped) -> Prepared:
 
 
 def _on_one_clock(units: list[Prepared], against: OnGrid | None, grid_s: FloatArray) -> list[Prepared]:
-    """Take off by how much stamps are late; the clock in the middle of three or more is the right one.
+    """Take off by how much stamps are late.
+
+    The clock in the middle of three or more is the right one.
 
     Of two it is the one that is nearer to the reference.
     """
@@ -233,7 +235,7 @@ def _unstuck(one: Prepared, units: list[Prepared], against: OnGrid | None) -> Pr
 
 
 def _steps_of(units: list[Prepared], against: OnGrid | None) -> tuple[Stepped, ...]:
-    """Find the steps of the witnesses: of position by their own velocity, of velocity by the other tracks."""
+    """Find steps of position by a unit's own velocity, of velocity by the other tracks."""
     own = [one for one in units if one.is_witness]
     found = [
         Stepped(jump, BY_VELOCITY, (one.topic,))

@@ -1,4 +1,4 @@
-"""Tab on several INS: errors of each unit and differences of pairs over time, and the chapter."""
+"""Tab on several INS: errors of each unit, differences of pairs, the chapter."""
 
 import rerun.blueprint as rrb
 

@@ -1,4 +1,4 @@
-"""Faults of units: those each shows by itself, by the reference, by parity of three, by difference of two."""
+"""Faults of units: own ones, by the reference, by parity, by difference of two."""
 
 from collections.abc import Mapping, Sequence
 
@@ -94,7 +94,7 @@ def growth_faults(
 
 
 def _are_acquitted(pair: Judged, by_reference: Mapping[str, Judged]) -> bool:
-    """Tell whether the reference saw both of a pair for nearly all of the time, within their limits."""
+    """Tell whether the reference saw both of a pair nearly all the time, within limits."""
     if pair.growth is None:
         return False
     both = [by_reference.get(topic) for topic in pair.topics]
@@ -163,7 +163,7 @@ def sentence_of(
 
 
 def _others(fault: InsFault, by_reference: Mapping[str, Judged]) -> str:
-    """Return the same figure of the other units, for a rate or velocity of one against the reference."""
+    """Return the same figure of the other units against the reference."""
     if len(fault.topics) != 1 or fault.kind not in ("drift", "tilt") or fault.topics[0] not in by_reference:
         return ""
     others = [one for topic, one in by_reference.items() if topic != fault.topics[0]]

@@ -51,7 +51,7 @@ def errors_of(ins: InsClass, route: Route, run: int, unit: int) -> Errors:
 
 
 def statistics_of(time_s: FloatArray, errors: Errors, start_s: float, *, is_known: bool) -> FloatArray:
-    """Return rate, velocity RMS and heading of a difference over each length of flight from a start on.
+    """Return rate, velocity RMS and heading of a difference over each length of flight.
 
     Shape (lengths, 3); they are those of :func:`growth_of`, for all lengths at once.
     """
@@ -67,7 +67,7 @@ def statistics_of(time_s: FloatArray, errors: Errors, start_s: float, *, is_know
 
 
 def simulated(ins_class: str, flights: int) -> dict[tuple[str, str], FloatArray]:
-    """Statistics of honest units of a class, shape (number, lengths, 3), by start and kind of difference."""
+    """Statistics of honest units of a class, by start and kind of difference."""
     last_s = (max(HOURS) + BEGUN_H) * S_PER_H + 2.0 * MEAN_S
     time_s = np.arange(0.0, last_s, STEP_S)
     found: dict[tuple[str, str], list[FloatArray]] = defaultdict(list)
