@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from groundstation.base.serial import from_json, to_json_exactly
+from groundstation.base.units import M_PER_NAUTICAL_MILE
 from groundstation.pipeline.verbs.synthesis import KeptRuns
 from groundstation.simulation.ins_units.family import BAD_INPUTS, BROKEN, FAULT_CASES, healthy_flight
 from groundstation.simulation.ins_units.flight import simulate_units
@@ -17,11 +18,10 @@ from groundstation.systems.inertial.study.units_runs import (
     CellError,
     UnitsCase,
     UnitsOutcome,
-    gnss_track,
     judge_flight,
     run_units,
+    tracks_of,
     truth_track,
-    unit_tracks,
     units_cases,
 )
 from groundstation.systems.inertial.study.units_tables import (
@@ -55,12 +55,14 @@ def test_every_case_of_the_family_is_flown_on_seeds_of_its_own() -> None:
 def test_tracks_are_what_the_units_wrote() -> None:
     settings = replace(healthy_flight(SEED, 4), duration_s=900.0, outages=())
     flight = simulate_units(settings, SEED, 4)
-    tracks, gnss, truth = unit_tracks(flight), gnss_track(flight), truth_track(flight)
-    assert [track.topic for track in tracks] == ["ins", "ins.1"]
+    tracks, truth = tracks_of(flight), truth_track(flight)
+    assert [track.topic for track in tracks.units] == ["ins", "ins.1"]
+    gnss = tracks.reference
     assert gnss is not None and truth is not None and np.array_equal(gnss.time_s, truth.time_s)
-    assert np.array_equal(tracks[1].velocity_mps, flight.units[1].velocity_mps)
+    assert np.array_equal(tracks.units[1].velocity_mps, flight.units[1].velocity_mps)
+    assert tracks.ins_class == settings.ins and tracks.units[1].start_s == (0.0 if settings.states_start else None)
     assert np.std(gnss.velocity_mps - truth.velocity_mps) == pytest.approx(0.036, abs=0.008)
-    assert gnss_track(simulate_units(replace(settings, has_gnss=False), SEED, 4)) is None
+    assert tracks_of(simulate_units(replace(settings, has_gnss=False), SEED, 4)).reference is None
 
 
 def test_what_counts_as_found_named_and_wrong() -> None:
@@ -123,7 +125,28 @@ def test_a_judged_flight_names_what_was_put_in() -> None:
     found = judge_flight(case_of("step 1000 m"), 1)  # three units with GNSS
     assert (found.units, found.mode) == (3, "with")
     assert found.is_named and found.has_kind and abs(found.late_s) < 60.0
-    assert {cell.quantity for cell in found.cells} >= {"rate_fit_nmiph", "velocity_rms_mps", "largest_m"}
+    (step,) = [cell for cell in found.cells if cell.quantity == "step, m"]
+    assert abs(step.error) < 20.0
+    healthy = judge_flight(CASES[0], 1)
+    assert not healthy.is_called and not healthy.faulty
+    rates = [cell for cell in healthy.cells if cell.quantity == "rate_fit_nmiph"]
+    assert len(rates) == 3 and all(0.0 < abs(cell.error) < 0.1 for cell in rates)
+
+
+def test_the_truth_of_the_table_is_that_of_the_simulated_errors() -> None:
+    """The figures that the intervals are held against, computed here from the errors themselves."""
+    settings = replace(healthy_flight(SEED, 1), duration_s=3600.0, outages=(), states_start=True)
+    flight = simulate_units(settings, SEED, 1)
+    true = tracks_of(flight).judged(truth_track(flight))
+    hours = flight.time_s / 3600.0
+    for unit, simulated in zip(true.units, flight.units, strict=True):
+        radial_nmi = np.hypot(*simulated.errors.position_m.T) / M_PER_NAUTICAL_MILE
+        assert unit.rate_fit_nmiph is not None and unit.velocity_rms_mps is not None and unit.largest_m is not None
+        rate = np.sum(hours * radial_nmi) / np.sum(hours**2)
+        assert unit.rate_fit_nmiph.value == pytest.approx(rate, rel=0.01, abs=1e-3)
+        rms = np.sqrt(np.mean(np.sum(simulated.errors.velocity_mps**2, axis=1)))
+        assert unit.velocity_rms_mps.value == pytest.approx(rms, rel=0.01, abs=2e-3)
+        assert unit.largest_m.value == pytest.approx(radial_nmi.max() * M_PER_NAUTICAL_MILE, rel=0.01, abs=1.0)
 
 
 @pytest.mark.slow

@@ -34,7 +34,7 @@ def study_units(
     Parameters
     ----------
     runs : int
-        Healthy flights; of each fault there are 0.3, of each bad input 0.15, of each broken assumption 0.5 times as
+        Healthy flights; of each fault there are 0.12, of each bad input 0.06, of each broken assumption 0.21 times as
         many.
     seed : int
         Family seeds are ``60 000 + 10 seed`` and the next one.
