@@ -196,7 +196,9 @@ def test_opposite_turns_serve_a_level_valve_and_are_refused_for_one_that_hangs()
 
 
 def test_few_headings_give_a_reason_with_what_they_do_show() -> None:
-    with pytest.raises(NotAssessableError, match=r"2 directions, widest gap 1[89]\d deg, do not show .*; error .* deg at"):
+    with pytest.raises(
+        NotAssessableError, match=r"2 directions, widest gap 1[89]\d deg, do not show .*; error .* deg at"
+    ):
         found(headings_deg=TWO, with_ins=False)
 
 
