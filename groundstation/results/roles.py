@@ -347,6 +347,8 @@ class FilterError:
         The worst first.
     constant : str
         Words on the constant and its cause; empty where there is none.
+    changed : str
+        Words on a change of the constant: the filter was wrong before or after; empty where there is none.
     """
 
     quantity: str
@@ -355,19 +357,20 @@ class FilterError:
     sigma_rms: float
     wrong: tuple[FilterWrong, ...] = ()
     constant: str = ""
+    changed: str = ""
 
 
 class ErrorsOfFilter:
-    """Role of an answer with the errors of an on-board filter.
+    """Role of an answer with the errors of on-board filters.
 
     Judged by states that do not come from it.
     """
 
     @property
-    def filter_topic(self) -> str:
-        """Topic of the filter whose errors are known.
+    def filter_topics(self) -> tuple[str, ...]:
+        """Topics of the filters whose errors are known, the one that flew the vehicle first.
 
-        Empty where none are, or the checks do not hold.
+        None are where the checks do not hold.
         """
         raise NotImplementedError
 
@@ -376,8 +379,8 @@ class ErrorsOfFilter:
         """Words for what is found by it: "by the best trajectory (heading to 0.3 deg)"."""
         raise NotImplementedError
 
-    def filter_errors(self) -> tuple[FilterError, ...]:
-        """Return the errors of that filter by quantity."""
+    def filter_errors(self, topic: str) -> tuple[FilterError, ...]:
+        """Return the errors of a filter by quantity."""
         raise NotImplementedError
 
 

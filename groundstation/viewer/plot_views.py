@@ -13,7 +13,7 @@ import numpy as np
 import rerun.blueprint as rrb
 
 from groundstation.plots import extents
-from groundstation.plots.marks import Band, Curve, Dots, Lanes, Limit, Mark, Spans
+from groundstation.plots.marks import Band, Curve, Dots, Lanes, Limit, Mark, Points, Spans
 from groundstation.plots.plot import Panel, Plot
 from groundstation.results.flight import FlightResults
 from groundstation.viewer import colours
@@ -167,6 +167,10 @@ def over_time(recorder: Recorder, path: str, panel: Panel, title: str) -> rrb.Vi
         elif isinstance(mark, Dots) and not _is_joined(mark, curves):
             rows = np.flatnonzero(np.isfinite(mark.x) & np.isfinite(mark.y))
             recorder.dots(f"{path}/d{place:02d}_dots", recorder.time_ns(mark.x[rows]), mark.y[rows], line)
+        elif isinstance(mark, Points) and mark.is_hollow:
+            rows = np.flatnonzero(np.isfinite(mark.x) & np.isfinite(mark.y))
+            time_ns = recorder.time_ns(mark.x[rows])
+            recorder.dots(f"{path}/e{place:02d}_hollow", time_ns, mark.y[rows], line, is_hollow=True)
         elif isinstance(mark, Curve | Dots):
             if id(mark) not in banded:
                 _join(groups, mark, line)

@@ -140,9 +140,13 @@ class Recorder:
             columns = rr.Measurements.columns(values=values[part], variances=variances[part])
             self.stream.send_columns(path, self.indexes(time_ns[part]), columns)
 
-    def dots(self, path: str, time_ns: Int64Array, values: FloatArray, line: Line) -> None:
-        """Log one series, shape (n,), as dots: samples that no line should join."""
-        style = rr.SeriesPoints(names=[line.name], colors=[line.colour], marker_sizes=[line.width], markers="circle")
+    def dots(self, path: str, time_ns: Int64Array, values: FloatArray, line: Line, *, is_hollow: bool = False) -> None:
+        """Log one series, shape (n,), as dots: samples that no line should join.
+
+        The viewer has no hollow ones: they are crosses, twice as large.
+        """
+        size, marker = (2.0 * line.width, "cross") if is_hollow else (line.width, "circle")
+        style = rr.SeriesPoints(names=[line.name], colors=[line.colour], marker_sizes=[size], markers=marker)
         self.static(path, style)
         self._scalars(path, time_ns, values[:, None])
 

@@ -13,14 +13,15 @@ from groundstation.base.findings import Finding
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.signals import topics_of_kind
 from groundstation.results.answer import Answers
-from groundstation.systems.inertial.answer import CHANNELS, Difference, InertialResult, OwnInnovation
-from groundstation.systems.inertial.departures import departures, filter_of_ins, findings_of
+from groundstation.systems.inertial.answer import CHANNELS, Difference, FilterOfIns, InertialResult, OwnInnovation
+from groundstation.systems.inertial.departures import departures, findings_of
 from groundstation.systems.inertial.differences import InsDifferences, differences
 from groundstation.systems.inertial.figures import differences_figure, own_innovations_figure, plain_track_figure
 from groundstation.systems.inertial.judged_answer import judged_filter
 from groundstation.systems.inertial.kind import LEAST_AIDED_S, WHY_NOT
 from groundstation.systems.inertial.model import FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
+from groundstation.tables.filter_of_ins import filter_of_ins
 from groundstation.tables.gaps import seconds_covered
 from groundstation.tables.own_filter import OwnInnovations, own_innovations
 from groundstation.tables.sources import AIDED, UNKNOWN
@@ -79,7 +80,7 @@ def compare_aided(
         own_filter="" if own is None else own.topic.removeprefix("raw."),
         own_innovations=() if own is None else _innovations(own),
         departures=departures(flight, compared, own) if kind[0] == AIDED else (),
-        filter_of_ins=filter_of_ins(flight, compared.ins_topic),
+        filter_of_ins=FilterOfIns(**vars(filter_of_ins(flight, compared.ins_topic))),
         figures=figures if own is None else (*figures, own_innovations_figure(flight, own)),
     )
     code, says = CODES[kind[0]], WHY_NOT[kind[0]]

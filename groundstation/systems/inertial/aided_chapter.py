@@ -137,9 +137,10 @@ def _errors(judged: JudgedFilter | None) -> Note | None:
         return None
     constant = f" Constant, and no error of the filter: {'; '.join(judged.constants)}." if judged.constants else ""
     wrong = f"Worst: {judged.wrong}. " if judged.worst else ""
+    wrong += "".join(f"{one[:1].upper()}{one[1:]}. " for one in judged.changes)
     along = "The chapter of what judges it has them along the flight."
     text = f"{wrong}Errors of the INS, judged {judged.by}: {judged.errors}.{constant} {along}"
-    return Note(typeset(text), "good" if judged.worst is None else "warn")
+    return Note(typeset(text), "good" if judged.worst is None and not judged.changes else "warn")
 
 
 def _why(answer: InertialResult, *, is_judged: bool) -> Note:

@@ -4,17 +4,13 @@ A filter that leaves its receiver shows it in three ways: the distance to GNSS, 
 its own gate, by which it rejects GNSS. Which of the two is wrong the difference alone does not tell.
 """
 
-import re
-
 import numpy as np
 
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.records import BoolArray
-from groundstation.base.signals import topics_of_kind
 from groundstation.systems.inertial.answer import Departure, FilterOfIns
 from groundstation.systems.inertial.differences import InsDifferences
 from groundstation.systems.inertial.model import FloatArray
-from groundstation.tables.estimator_in_use import estimator_in_use
 from groundstation.tables.own_filter import OwnInnovations
 from groundstation.tables.table import Flight
 
@@ -25,7 +21,6 @@ LEAST_S = 5.0  # a shorter one is an outlier
 JOINED_S = 10.0  # two with less between them are one
 START_S = 30.0  # a filter that has just begun is still finding its place
 MOST_TOLD = 5
-_ESTIMATORS = re.compile(r"\b(EKF[123]|DCM)\b")
 
 
 def departures(flight: Flight, compared: InsDifferences, own: OwnInnovations | None) -> tuple[Departure, ...]:
@@ -54,18 +49,6 @@ def departures(flight: Flight, compared: InsDifferences, own: OwnInnovations | N
             )
         )
     return tuple(found)
-
-
-def filter_of_ins(flight: Flight, topic: str) -> FilterOfIns:
-    """Return the estimator of an INS topic, and whether it flew the aircraft."""
-    told = " ".join(text for key, text in sorted(flight.metadata.items()) if key.startswith(f"derived.{topic}."))
-    names = _ESTIMATORS.findall(told)
-    in_use = estimator_in_use(flight)
-    name = names[-1] if names else "" if in_use is None or in_use.others else in_use.name
-    if in_use is None or not name:
-        return FilterOfIns(name)
-    has_others = len(topics_of_kind("ins", flight.topics())) > 1
-    return FilterOfIns(name, in_use.flew(name) if names or not has_others else None, in_use.source)
 
 
 def findings_of(found: tuple[Departure, ...], of: FilterOfIns, usual_m: float | None, topic: str) -> list[Finding]:

@@ -49,6 +49,11 @@ class JudgedFilter:
         return f"{listed([_size(row) for row in told])}, RMS"
 
     @property
+    def changes(self) -> tuple[str, ...]:
+        """Words on constants that changed: wrong before or after."""
+        return tuple(f"{row.quantity} {row.changed}" for row in self.rows if row.changed)
+
+    @property
     def constants(self) -> tuple[str, ...]:
         """Words on what was constant all through the log, which is no error of the filter."""
         return tuple(row.constant for row in self.rows if row.constant)
@@ -57,7 +62,7 @@ class JudgedFilter:
 def judged_filter(answers: Answers, ins_topic: str) -> JudgedFilter | None:
     """Return the errors of an INS topic; None where no answer knows them."""
     found = answer_meeting(answers, ErrorsOfFilter)
-    rows = () if found is None or found.filter_topic != ins_topic else found.filter_errors()
+    rows = () if found is None else found.filter_errors(ins_topic)
     if found is None or not any(row.quantity in TOLD for row in rows):
         return None
     return JudgedFilter(found.by_it, rows)

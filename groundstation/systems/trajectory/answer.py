@@ -157,6 +157,9 @@ class BestTrajectory(Answer, StatesAlongTheFlight, ErrorsOfFilter):
     aids : tuple of AidRow
         Barometer, wheels, magnetic heading of the log, used or not.
     onboard : OnboardErrors or None
+        Of the filter that flew the vehicle, where the log tells it.
+    other_filters : tuple of OnboardErrors
+        Of further ones: other INSs, lanes of the autopilot.
     separation : tuple of SeparationRow
     """
 
@@ -186,6 +189,7 @@ class BestTrajectory(Answer, StatesAlongTheFlight, ErrorsOfFilter):
     hypotheses: tuple[HeadingHypothesis, ...] = ()
     aids: tuple[AidRow, ...] = ()
     onboard: OnboardErrors | None = None
+    other_filters: tuple[OnboardErrors, ...] = ()
     separation: tuple[SeparationRow, ...] = ()
     settings: dict[str, Any] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
@@ -260,8 +264,10 @@ class BestTrajectory(Answer, StatesAlongTheFlight, ErrorsOfFilter):
 
         Both stand against the inertial unit. None where the log does not show it, or the filter is another one's.
         """
-        filter_, latency, lag = self.onboard, self.gnss_latency, self.parameter(VELOCITY_LAG)
-        if filter_ is None or filter_.topic != ins_topic or filter_.delay_s is None or latency is None:
+        every = () if self.onboard is None else (self.onboard, *self.other_filters)
+        filter_ = next((one for one in every if one.topic == ins_topic), None)
+        latency, lag = self.gnss_latency, self.parameter(VELOCITY_LAG)
+        if filter_ is None or filter_.delay_s is None or latency is None:
             return None
         value, sigma = latency
         if lag is not None:
@@ -281,16 +287,20 @@ class BestTrajectory(Answer, StatesAlongTheFlight, ErrorsOfFilter):
         return found_in(self.figures, BodyStates)
 
     @property
-    def filter_topic(self) -> str:
-        """Topic of the filter whose errors are known.
+    def filter_topics(self) -> tuple[str, ...]:
+        """Topics of the filters whose errors are known.
 
-        Empty where none are, or the checks do not hold.
+        None are where the checks do not hold.
         """
-        return self.onboard.topic if self.onboard is not None and self.is_reference else ""
+        return tuple(one.topic for one in self._filters)
 
-    def filter_errors(self) -> tuple[FilterError, ...]:
-        """Return the errors of that filter by quantity."""
-        rows = self.onboard.rows if self.onboard is not None and self.is_reference else ()
+    @property
+    def _filters(self) -> tuple[OnboardErrors, ...]:
+        return (self.onboard, *self.other_filters) if self.onboard is not None and self.is_reference else ()
+
+    def filter_errors(self, topic: str) -> tuple[FilterError, ...]:
+        """Return the errors of a filter by quantity."""
+        found = next((one for one in self._filters if one.topic == topic), None)
         whole_s = (self.start_s, self.end_s)
         return tuple(
             FilterError(
@@ -303,6 +313,7 @@ class BestTrajectory(Answer, StatesAlongTheFlight, ErrorsOfFilter):
                     for one in row.spans
                 ),
                 row.offset_words,
+                row.changed,
             )
-            for row in rows
+            for row in (() if found is None else found.rows)
         )

@@ -15,7 +15,7 @@ from groundstation.chapters.wording import (
 )
 from groundstation.results.flight import FlightResults
 from groundstation.systems.trajectory.answer import BestTrajectory, TrajectoryParameter, UnitMounting
-from groundstation.systems.trajectory.checks_answer import HeldOutRow, InnovationRow
+from groundstation.systems.trajectory.checks_answer import InnovationRow
 from groundstation.systems.trajectory.claim_chapter import (
     claim_of,
     full_sentence,
@@ -23,7 +23,8 @@ from groundstation.systems.trajectory.claim_chapter import (
     unit_sign_of,
     wrong_texts,
 )
-from groundstation.systems.trajectory.onboard_answer import OnboardError
+from groundstation.systems.trajectory.onboard_answer import OnboardError, OnboardErrors
+from groundstation.systems.trajectory.quantity_answer import UNITS, Quantity
 from groundstation.systems.trajectory.wording_answer import (
     sentence_of,
     when,
@@ -55,9 +56,11 @@ def trajectory(results: FlightResults) -> Section | None:
         Figure("trajectory.onboard_attitude"),
         Figure("trajectory.onboard_motion"),
         _onboard(answer),
+        _every_filter(answer),
         _outages(answer),
         Figure("trajectory.outages"),
         _checks(answer),
+        _residuals(answer),
         _aids(answer),
         _parameters(answer),
     ]
@@ -166,9 +169,56 @@ def _onboard(answer: BestTrajectory) -> Grid | None:
         caption += f" Its stamps are later than those of the inertial unit by {typeset(delay)}; that is taken off."
     if not is_sure:
         caption += " Spans are not told: the sigmas are not sure enough to blame the filter."
-    return Grid(
-        f"Errors of the on-board filter ({answer.onboard.topic})", heads, rows, caption, ("trajectory_onboard",)
+    if answer.onboard.flew is not None:
+        flew = "It flew the vehicle" if answer.onboard.flew else "It did not fly the vehicle"
+        caption += f" {flew} ({typeset(answer.onboard.flew_source)})."
+    known = next((one.axes_sigma for one in answer.onboard.rows if one.axes_sigma is not None), None)
+    if known is not None and any(one.changes or one.spans for one in answer.onboard.rows):
+        caption += (
+            " Where a constant changes, the part is right that agrees with the axes of the filter, which its turning "
+            "shows."
+        )
+    title = f"Errors of the on-board filter ({answer.onboard.title})"
+    return Grid(title, heads, rows, caption, ("trajectory_onboard",))
+
+
+def _every_filter(answer: BestTrajectory) -> Grid | None:
+    """Return the filters of the log beside each other; None where there is one."""
+    if answer.onboard is None or not answer.other_filters:
+        return None
+    quantities: tuple[Quantity, ...] = (
+        *("heading", "roll", "pitch", "horizontal velocity", "vertical velocity"),
+        *("horizontal position", "vertical position"),
     )
+    every = (answer.onboard, *answer.other_filters)
+    known = [one for one in quantities if any(each.row(one) is not None for each in every)]
+    heads = (Head("Filter"), Head("Flew the vehicle"), *(Head(f"{_capital(one)}, {_unit(one)}", True) for one in known))
+    heads = (*heads, Head("Wrong beyond 95 %"))
+    rows = [
+        (
+            typeset(one.title),
+            {True: "yes", False: "no", None: ABSENT}[one.flew],
+            *(_rms(one.row(quantity)) for quantity in known),
+            _places_wrong(one) if answer.state == "accepted" else ABSENT,
+        )
+        for one in every
+    ]
+    caption = "RMS of output minus smoothed solution, constants taken off. The first one is told above."
+    return Grid("All filters of the log", heads, rows, caption)
+
+
+def _unit(quantity: Quantity) -> str:
+    return unit_sign_of(UNITS[quantity])
+
+
+def _rms(row: OnboardError | None) -> str:
+    return ABSENT if row is None else significant(row.rms, 2)
+
+
+def _places_wrong(of: OnboardErrors) -> str:
+    """Return the quantities in which a filter was wrong somewhere, or changed."""
+    wrong = [one.quantity for one in of.rows if one.spans or one.changes]
+    return ", ".join(wrong) if wrong else "nowhere"
 
 
 def _onboard_row(answer: BestTrajectory, row: OnboardError, *, is_sure: bool) -> tuple[Cell, ...]:
@@ -176,6 +226,8 @@ def _onboard_row(answer: BestTrajectory, row: OnboardError, *, is_sure: bool) ->
     if row.offset is not None and row.offset_sigma is not None:
         constant = typeset(with_half(row.offset, 1.96 * row.offset_sigma, row.unit))
     wrong: Cell = Mark("good", "nowhere") if is_sure else ABSENT
+    if is_sure and row.changes:
+        wrong = Mark("warn", typeset(row.changed))
     if is_sure and row.spans:
         span = row.spans[0]
         more = f" (+{len(row.spans) - 1})" if len(row.spans) > 1 else ""
@@ -215,15 +267,15 @@ def _outages(answer: BestTrajectory) -> Grid | None:
 
 
 def _checks(answer: BestTrajectory) -> Grid | None:
-    rows: list[tuple[Cell, ...]] = [*map(_innovation, answer.innovations), *map(_held_out, answer.held_out)]
+    rows: list[tuple[Cell, ...]] = [*map(_innovation, answer.innovations)]
     if answer.own_track is not None:
         own = answer.own_track
         scatter = "" if own.scatter_100_s_deg is None else f"; medians of 100 s {number(own.scatter_100_s_deg, 2, '°')}"
         found = f"MAD {number(own.mad_deg, 2, '°')}{scatter}"
         rows.append(("Heading minus own track, straights", found, ABSENT, number(own.samples, 0), ABSENT))
     heads = (Head("Check"), Head("Found", True), Head("Expected", True), Head("n", True), Head("State"))
-    caption = "Held out: every tenth run of GNSS, kept from the solution. Innovations: mean square over expected."
-    return Grid("Checks on the log itself", heads, rows, caption, ("trajectory_residuals",)) if rows else None
+    caption = "Innovations: mean square over expected."
+    return Grid("Checks on the log itself", heads, rows, caption) if rows else None
 
 
 def _aids(answer: BestTrajectory) -> Grid | None:
@@ -248,10 +300,26 @@ def _innovation(row: InnovationRow) -> tuple[Cell, ...]:
     return f"Innovations, {row.sensor}", number(row.ratio, 2), expected, number(row.count, 0), mark
 
 
-def _held_out(row: HeldOutRow) -> tuple[Cell, ...]:
-    share = f"{percent(row.inside95_share)} inside 95 %"
-    found = f"RMS {_with(row.error_rms, row.unit)}"
-    return f"GNSS held out, {row.quantity}", found, _with(row.sigma_rms, row.unit), number(row.count, 0), share
+def _residuals(answer: BestTrajectory) -> Grid | None:
+    """Return GNSS held out of the solution beside the GNSS that it used."""
+    heads = (
+        *(Head("GNSS minus solution"), Head("Used, RMS", True), Head("n", True), Head("Held out, RMS", True)),
+        *(Head("Expected of it", True), Head("n", True), Head("Inside 95 %", True)),
+    )
+    rows: list[tuple[Cell, ...]] = [
+        (
+            _capital(one.quantity),
+            _with(one.used_rms, one.unit),
+            number(one.used_count, 0),
+            _with(one.error_rms, one.unit),
+            _with(one.sigma_rms, one.unit),
+            number(one.count, 0),
+            percent(one.inside95_share),
+        )
+        for one in answer.held_out
+    ]
+    caption = "Held out: ten seconds of every hundred, against a solution without them. n: values, each axis by itself."
+    return Grid("GNSS used and held out", heads, rows, caption, ("trajectory_residuals",)) if rows else None
 
 
 def _parameters(answer: BestTrajectory) -> Grid | None:

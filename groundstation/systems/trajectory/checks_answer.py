@@ -39,7 +39,8 @@ class InnovationRow:
 class HeldOutRow:
     """GNSS that was held out of the solution against it.
 
-    ``error_rms`` is solution minus GNSS, ``sigma_rms`` what both sigmas expect of it.
+    ``error_rms`` is GNSS minus solution, ``sigma_rms`` what both sigmas expect of it. ``used_rms`` is that of the
+    ``used_count`` values that were used.
     """
 
     quantity: Quantity
@@ -48,6 +49,8 @@ class HeldOutRow:
     error_rms: float
     sigma_rms: float
     inside95_share: float
+    used_rms: float | None = None
+    used_count: int = 0
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,9 @@ from groundstation.systems.trajectory.answer import BestTrajectory, TrajectorySt
 from groundstation.systems.trajectory.checks_answer import OutageRow
 from groundstation.systems.trajectory.wording_answer import (
     accuracy_words,
+    change_words,
     error_words,
+    opening_change,
     opening_error,
     rounded,
     sentence_of,
@@ -22,6 +24,7 @@ MARKS: Mapping[TrajectoryState, Mark] = {
     "ambiguous": Mark("warn", "Ambiguous"),
 }
 WRONG = Mark("warn", "Filter wrong")
+CHANGED = Mark("warn", "Filter changed")
 DANGER_DEG = {"heading": 10.0, "roll": 5.0, "pitch": 5.0}  # surely wrong by so much
 STARTING_S = 30.0  # a filter that has just begun is still finding its heading
 MOST_TOLD = 3
@@ -30,7 +33,13 @@ MOST_TOLD = 3
 def claim_of(answer: BestTrajectory) -> Claim:
     """Return the claim: a sure error of the on-board filter, else state and accuracy."""
     figures = [*_figures(answer)]
-    worst = opening_error(answer)
+    worst, changed = opening_error(answer), opening_change(answer)
+    if changed is not None:
+        row, change = changed, changed.changes[0]
+        value = typeset(with_half(change.by, change.half95, row.unit))
+        sentences = [full_sentence(f"best trajectory: {accuracy_words(answer)}")]
+        remark, headline = f"on-board {row.quantity}, changed", _headline(sentence_of(answer))
+        return Claim(Rank.ONBOARD_ERROR, CHANGED, headline, value, remark, sentences, figures)
     if worst is not None:
         row, span = worst
         is_danger = (
@@ -86,6 +95,8 @@ def wrong_texts(answer: BestTrajectory) -> list[str]:
             more = len(row.spans) - 1
             also = f"; {more} more span{'s' * (more > 1)}" if more else ""
             told.append(error_words(answer, row, row.spans[0]) + also)
+        if row.changes:
+            told.append(change_words(row))
     worst = opening_error(answer)
     if worst is not None:
         first = error_words(answer, *worst)
@@ -95,7 +106,11 @@ def wrong_texts(answer: BestTrajectory) -> list[str]:
 
 def inside_texts(answer: BestTrajectory) -> list[str]:
     """Return that the on-board filter shows no error beyond 95 %, with what is left."""
-    if answer.onboard is None or answer.state != "accepted" or any(one.spans for one in answer.onboard.rows):
+    if (
+        answer.onboard is None
+        or answer.state != "accepted"
+        or any(one.spans or one.changes for one in answer.onboard.rows)
+    ):
         return []
     left = [
         f"{one.quantity} {significant(one.rms, 2)} {one.unit}"

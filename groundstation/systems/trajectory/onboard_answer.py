@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from groundstation.base.words import clock_text, with_half
 from groundstation.systems.trajectory.quantity_answer import OPENING_ERROR, Quantity
 
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
@@ -30,6 +31,23 @@ class WrongSpan:
 
 
 @dataclass(frozen=True)
+class ChangeOfConstant:
+    """Moment at which the constant of the on-board filter became another one.
+
+    The filter was wrong before it or behind it, by ``by`` with half of its 95 % interval ``half95``; the log does not
+    tell which. Of a vector ``by`` is the length.
+    """
+
+    at_s: float
+    by: float
+    half95: float
+
+    def over(self, quantity: Quantity) -> float:
+        """Return what is sure of it, over the error that a report opens with."""
+        return (abs(self.by) - self.half95) / OPENING_ERROR[quantity]
+
+
+@dataclass(frozen=True)
 class OnboardError:
     """Error of the on-board filter in one quantity: its output minus the smoothed solution.
 
@@ -52,6 +70,11 @@ class OnboardError:
         Time for which its errors last.
     spans : tuple of WrongSpan
         The worst first.
+    changes : tuple of ChangeOfConstant
+        The largest first.
+    axes_sigma : float or None
+        Sigma of the filter's axes against ours, by which an error with nothing taken off is known; None where they are
+        not known.
     """
 
     quantity: Quantity
@@ -65,6 +88,17 @@ class OnboardError:
     sigma_rms: float
     correlation_s: float
     spans: tuple[WrongSpan, ...] = ()
+    changes: tuple[ChangeOfConstant, ...] = ()
+    axes_sigma: float | None = None
+
+    @property
+    def changed(self) -> str:
+        """Words on the largest change: "changed by 2.1 +- 0.2 deg at 6:36 (95 %) ..."."""
+        if not self.changes:
+            return ""
+        one = self.changes[0]
+        by = with_half(one.by, one.half95, self.unit)
+        return f"changed by {by} at {clock_text(one.at_s)} (95 %): wrong before or after, which cannot be told"
 
 
 @dataclass(frozen=True)
@@ -74,15 +108,28 @@ class OnboardErrors:
     Parameters
     ----------
     topic : str
+        ``ins``, or the topics that a lane of the autopilot's filter logs.
     rows : tuple of OnboardError
     delay_s, delay_sigma_s : float or None
         How much later than the inertial unit its stamps are, taken off; None where the motion does not tell.
+    name : str
+        Of the filter, "EKF3"; empty where the log does not tell it.
+    flew : bool or None
+        The aircraft was flown by it; None where the log does not tell. ``flew_source`` is the parameter that does.
     """
 
     topic: str
     rows: tuple[OnboardError, ...]
     delay_s: float | None = None
     delay_sigma_s: float | None = None
+    name: str = ""
+    flew: bool | None = None
+    flew_source: str = ""
+
+    @property
+    def title(self) -> str:
+        """Topic with the name of the filter: "ins, EKF3"."""
+        return f"{self.topic}, {self.name}" if self.name else self.topic
 
     def row(self, quantity: Quantity) -> OnboardError | None:
         """Return the row of a quantity, None where the filter does not log it."""

@@ -18,6 +18,8 @@ STEPS = 8
 ARM_SIGMA_M, DATUM_SIGMA_M = 30.0, 1000.0  # priors of an antenna's place on the vehicle, and of another datum
 ARM_FLOOR_M = 0.03  # what the velocities of one filter may be apart from its attitude by
 FEWEST = 30
+LEVEL_SHARE = 0.4  # of the values, in the narrowest band
+MOST_WIDTHS = 10.0  # of it, in 90 % of the values: normal ones have 3.1
 TURNED = 0.7  # mean of the headings as unit vectors: above it the vehicle has not turned enough
 LEAST_SCALE = 1e-9
 
@@ -50,12 +52,27 @@ def centre_of(values: FloatArray, own_sigma: FloatArray, length_s: float) -> Con
     The sigma has the scatter of the values, correlated as they are, and that of the smoothed solution, of which a log
     of ``length_s`` has an independent value each minute.
     """
-    known = values[np.isfinite(values)]
+    known = _one_level(values[np.isfinite(values)])
     if not len(known):
         return Constant(float("nan"), float("inf"))
     middle = float(np.median(known))
     own = float(np.sqrt(np.nanmedian(own_sigma**2) / max(length_s / OWN_S, 1.0)))
     return Constant(middle, float(np.hypot(_sigma_of_mean(known - middle), own)))
+
+
+def _one_level(values: FloatArray) -> FloatArray:
+    """Return the values of the fullest level where they lie at several; else all of them."""
+    count = int(LEVEL_SHARE * len(values))
+    if count < FEWEST:
+        return values
+    ordered = np.sort(values)
+    widths = ordered[count:] - ordered[:-count]
+    first = int(np.argmin(widths))
+    low, high, width = ordered[first], ordered[first + count], max(float(widths[first]), LEAST_SCALE)
+    is_between = not low - width <= np.median(values) <= high + width
+    if not is_between and float(np.ptp(np.percentile(values, (5.0, 95.0)))) < MOST_WIDTHS * width:
+        return values
+    return np.asarray(values[(values >= low - width) & (values <= high + width)])
 
 
 def constant_turn(ours: FloatArray, theirs: FloatArray) -> FloatArray:

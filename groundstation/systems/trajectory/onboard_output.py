@@ -6,9 +6,10 @@ import numpy as np
 
 from groundstation.base.geodesy import has_position
 from groundstation.base.records import HEADING_IS_TRACK
+from groundstation.systems.trajectory.onboard_filters import LoggedFilter
 from groundstation.systems.trajectory.sampling import thinned
 from groundstation.systems.trajectory.solution import FloatArray
-from groundstation.tables.table import Flight, Table
+from groundstation.tables.table import Flight
 
 STEP_S = 0.1  # faster output says no more
 MOST_SAMPLES = 100_000
@@ -33,14 +34,15 @@ class FilterOutput:
     plane_m: FloatArray
 
 
-def output_of(flight: Flight, topic: str) -> FilterOutput | None:
-    table: Table = flight[topic].trusted().unique_times()
+def output_of(flight: Flight, of: LoggedFilter) -> FilterOutput | None:
+    """Return the output of a filter at 10 Hz; None where it has too few rows."""
+    table = of.table.trusted().unique_times()
     if len(table) < FEWEST:
         return None
     time_s = flight.seconds(table.time_ns)
     step_s = max(STEP_S, float(time_s[-1] - time_s[0]) / MOST_SAMPLES)
     table = table.take(thinned(time_s, step_s))
-    is_track = f"{HEADING_IS_TRACK}.{topic}.true_heading_deg" in flight.metadata
+    is_track = f"{HEADING_IS_TRACK}.{of.topic}.true_heading_deg" in flight.metadata
     heading = np.full(len(table), np.nan) if is_track else table.values("true_heading_deg")
     height = table.values("altitude_ellipsoid_m")
     for values in (table.values("altitude_msl_m"), -table.values("position_down_m")):

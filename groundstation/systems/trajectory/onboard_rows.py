@@ -7,19 +7,23 @@ import numpy as np
 from groundstation.methods.intervals import effective_samples
 from groundstation.systems.trajectory.arrays import TrajectoryOnboard
 from groundstation.systems.trajectory.onboard_answer import OffsetCause, OnboardError
+from groundstation.systems.trajectory.onboard_changes import Absolute, judged
 from groundstation.systems.trajectory.onboard_errors import ErrorsOfOutput
 from groundstation.systems.trajectory.onboard_offsets import (
     Constant,
     PlaceOffset,
 )
 from groundstation.systems.trajectory.onboard_output import FEWEST, FilterOutput
-from groundstation.systems.trajectory.onboard_spans import wrong_spans
 from groundstation.systems.trajectory.quantity_answer import LEAST_ERROR, UNITS, Quantity
 from groundstation.systems.trajectory.solution import FloatArray
 
 BIN_S, MOST_BINS = 1.0, 20_000  # errors are judged and shown as medians over it
 ANGLES: tuple[Quantity, ...] = ("roll", "pitch", "heading")
 NOTHING = Constant(0.0, 0.0)
+PLACE_SIGMA_M = 15.0  # of the point of a filter on its vehicle
+HEIGHT_SIGMA_M = 60.0  # of one datum of heights against another
+KNOWN_DEG = 10.0  # axes of a filter that are less sure are not known
+AbsoluteAngles = tuple[Absolute, Absolute, Absolute]
 
 
 class TimeBins:
@@ -83,7 +87,10 @@ class ToldConstant(NamedTuple):
 UPWARD = ToldConstant(cause="sign", words="logged with the other sign: up, not down")
 
 
-def rows_of(found: ErrorsOfOutput, figure: TrajectoryOnboard, bins: TimeBins, down: ToldConstant) -> list[OnboardError]:
+def rows_of(
+    found: ErrorsOfOutput, figure: TrajectoryOnboard, bins: TimeBins, down: ToldConstant, axes: AbsoluteAngles
+) -> list[OnboardError]:
+    """Return a row for each quantity that the filter logs."""
     ours = found.ours
     rows: list[OnboardError | None] = []
     binned = ((figure.roll_deg, figure.roll_sigma_deg), (figure.pitch_deg, figure.pitch_sigma_deg))
@@ -91,7 +98,7 @@ def rows_of(found: ErrorsOfOutput, figure: TrajectoryOnboard, bins: TimeBins, do
         offset = found.attitude_offsets[axis]
         told = _told(offset, "mounting", f"{ANGLES[axis] if axis < 2 else 'yaw'} {offset.value:+.2f} deg")
         own = ours.attitude_sigma_deg[:, axis]
-        rows.append(_row(ANGLES[axis], found.attitude_deg[:, axis], own, told, (shown, sigma), bins))
+        rows.append(_row(ANGLES[axis], found.attitude_deg[:, axis], own, told, (shown, sigma), bins, axes[axis]))
     rows = [rows[2], rows[0], rows[1]]
     plane = (
         np.column_stack([figure.velocity_north_mps, figure.velocity_east_mps]),
@@ -104,10 +111,12 @@ def rows_of(found: ErrorsOfOutput, figure: TrajectoryOnboard, bins: TimeBins, do
     rows.append(_row("vertical velocity", found.velocity_mps[:, 2], own, down, climb, bins))
     place = (np.column_stack([figure.position_north_m, figure.position_east_m]), figure.horizontal_position_sigma_m)
     own = np.hypot(ours.position_sigma_m[:, 0], ours.position_sigma_m[:, 1])
-    rows.append(_row("horizontal position", found.plane_m, own, _told_place(found.place), place, bins))
+    far = Absolute(bins.medians(np.linalg.norm(found.plane_m + found.place.fitted, axis=1)), PLACE_SIGMA_M)
+    rows.append(_row("horizontal position", found.plane_m, own, _told_place(found.place), place, bins, far))
     level = (figure.height_m, figure.vertical_position_sigma_m)
     told = _told(found.height_offset, "datum", f"height {found.height_offset.value:+.2f} m (datum or antenna)")
-    rows.append(_row("vertical position", found.height_m, ours.position_sigma_m[:, 2], told, level, bins))
+    high = Absolute(figure.height_m + found.height_offset.value, HEIGHT_SIGMA_M)
+    rows.append(_row("vertical position", found.height_m, ours.position_sigma_m[:, 2], told, level, bins, high))
     return [one for one in rows if one is not None]
 
 
@@ -151,6 +160,7 @@ def _row(
     told: ToldConstant,
     binned: tuple[FloatArray, FloatArray],
     bins: TimeBins,
+    absolute: Absolute | None = None,
 ) -> OnboardError | None:
     """Return the row of a quantity; None where the filter does not log it."""
     size = np.hypot(error[:, 0], error[:, 1]) if error.ndim > 1 else np.abs(error)
@@ -162,6 +172,8 @@ def _row(
     seen = first[np.isfinite(first)]
     axis_sigma = sigma / 2.0**0.5 if shown.ndim > 1 else sigma
     length_s = len(seen) * bins.width_s
+    by_axes = absolute.sigma if quantity in ANGLES and absolute is not None else float("inf")
+    by_parts = judged(bins.time_s, shown, axis_sigma, told.sigma or 0.0, LEAST_ERROR[quantity], absolute)
     return OnboardError(
         quantity,
         UNITS[quantity],
@@ -173,5 +185,7 @@ def _row(
         rms=float(np.sqrt(np.mean(size[known] ** 2))),
         sigma_rms=float(np.sqrt(np.mean(own_sigma[known] ** 2))),
         correlation_s=0.5 * length_s / effective_samples(seen),
-        spans=wrong_spans(bins.time_s, shown, axis_sigma, told.sigma or 0.0, LEAST_ERROR[quantity]),
+        spans=by_parts.spans,
+        changes=by_parts.changes,
+        axes_sigma=by_axes if by_axes < KNOWN_DEG else None,
     )

@@ -284,7 +284,6 @@ def residuals(results: FlightResults) -> Plot | None:
     kinds: tuple[tuple[str, Flags, Role], ...] = (
         ("used", data.is_used & ~data.is_held_out, "gnss"),
         ("rejected", ~data.is_used & ~data.is_held_out, "bad"),
-        ("held out", data.is_held_out, "answer"),
     )
     rows: list[Row] = []
     for axis, values in known:
@@ -292,13 +291,17 @@ def residuals(results: FlightResults) -> Plot | None:
         for name, chosen, role in kinds:
             if (chosen & np.isfinite(values)).any():
                 marks.append(Dots(x=data.time_s, y=np.where(chosen, values, np.nan), role=role, name=name))
+        held = np.flatnonzero(data.is_held_out & np.isfinite(values))
+        if len(held):
+            place = {"x": data.time_s[held], "y": values[held]}
+            marks.append(Points(**place, symbol="ring", role="answer", name="held out", is_hollow=True))
         low, high = symmetric(usual(values), 1e-3)
         panel = Panel(marks, ends, Axis(axis, low=low, high=high), legend="" if rows else "above")
         rows.append(Row((panel,), 20.0, shares_x=axis != known[-1][0]))
     return Plot(
         "trajectory.residuals",
         "GNSS minus smoothed solution",
-        "At the antenna. Held out: kept from the solution, to check it.",
+        "At the antenna. Hollow: held out, ten seconds of every hundred, against a solution without them.",
         "Residuals of GNSS position and velocity over flight time.",
         tuple(rows),
         ("trajectory_residuals",),

@@ -10,7 +10,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.results.gates import Gate, judged_gate
 from groundstation.systems.known import Known
-from groundstation.systems.trajectory import checks, figures, judge, tell
+from groundstation.systems.trajectory import checks, figures, fix_residuals, judge, tell
 from groundstation.systems.trajectory.aids_input import Aids, aids_of
 from groundstation.systems.trajectory.answer import BestTrajectory, TrajectoryState, UnitMounting
 from groundstation.systems.trajectory.checks_answer import HeadingHypothesis, InnovationRow
@@ -21,6 +21,7 @@ from groundstation.systems.trajectory.inputs import ImuIncrements
 from groundstation.systems.trajectory.mounting import Mounting, find_mounting
 from groundstation.systems.trajectory.mounting_logged import logged_mounting
 from groundstation.systems.trajectory.onboard import ComparedFilter, compare_onboard
+from groundstation.systems.trajectory.onboard_filters import filters_of
 from groundstation.systems.trajectory.outages import Outages, replay
 from groundstation.systems.trajectory.segments import SUBJECT, Segment, estimate_segments, moving_s
 from groundstation.systems.trajectory.settings import TrajectorySettings
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from groundstation.tables.table import Flight
 
 COARSE_LAG_S = 0.15  # a coarse latency that is smaller is left to the filter
-INS = "ins"
 
 
 @dataclass(frozen=True)
@@ -158,6 +158,7 @@ def _answered(
     innovations = checks.innovations_of(main)
     _fits(innovations, main, settings)
     outages = _joined([replay(one) for one in estimates])
+    residuals = [fix_residuals.residuals_of(one) for one in estimates]
     plain = joined([smoothed_track(one.problem.samples, one.result, segment=i) for i, one in enumerate(estimates)])
     own = checks.against_own_track(plain) if main.problem.has_slip else None
     moving = _moving(plain, settings)
@@ -200,21 +201,22 @@ def _answered(
         noise=tell.noise_rows(main),
         parameters=tell.parameter_rows(main),
         innovations=innovations,
-        held_out=checks.held_out(main),
+        held_out=fix_residuals.held_out_rows(residuals[estimates.index(main)]),
         own_track=own,
         outages=judge.outage_rows(outages, factors.position, factors.height),
         outage_truth="RTK" if gathered.gnss_facts.precise_share > 0.9 else "undisturbed solution",
         hypotheses=hypotheses,
         aids=longest.aids,
-        onboard=None if compared is None else compared.errors,
+        onboard=compared[0].errors if compared else None,
+        other_filters=tuple(one.errors for one in compared[1:]),
         separation=separation,
         settings=asdict(settings),
         figures=(
             figures.track_figure(smoothed, other),
             figures.states_of(smoothed, gathered.gnss_facts.height),
             separation_figure,
-            *(() if compared is None else (compared.figure,)),
-            tell.residuals_of(estimates),
+            *(one.figure for one in compared[:1]),
+            fix_residuals.residuals_figure(residuals),
             tell.biases_of(estimates),
             tell.outages_of(outages, factors.position),
         ),
@@ -343,14 +345,11 @@ def _told(mounting: Mounting) -> UnitMounting:
     return UnitMounting(source, mounting.words, roll, pitch, yaw)
 
 
-def _onboard(smoothed: TrackOfStates, flight: "Flight") -> ComparedFilter | None:
-    """Compare the filter that the vehicle flies by, where its log has one."""
-    topics = [topic for topic in flight.topics() if topic == INS or topic.startswith(f"{INS}.")]
-    for topic in sorted(topics):
-        found = compare_onboard(smoothed, flight, topic)
-        if found is not None:
-            return found
-    return None
+def _onboard(smoothed: TrackOfStates, flight: "Flight") -> tuple[ComparedFilter, ...]:
+    """Compare the filters of the log, the one that flew the vehicle first."""
+    is_own = logged_mounting(flight) is not None
+    every = (compare_onboard(smoothed, flight, one, is_own=is_own) for one in filters_of(flight))
+    return tuple(one for one in every if one is not None)
 
 
 def _findings(gathered: Gathered, answer: BestTrajectory) -> tuple[Finding, ...]:

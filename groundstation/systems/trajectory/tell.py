@@ -4,13 +4,11 @@ import numpy as np
 
 from groundstation.base.units import MPS2_PER_G
 from groundstation.systems.trajectory.answer import ARM, LATENCY, VELOCITY_LAG, NoiseRow, TrajectoryParameter
-from groundstation.systems.trajectory.arrays import TrajectoryBiases, TrajectoryOutages, TrajectoryResiduals
+from groundstation.systems.trajectory.arrays import TrajectoryBiases, TrajectoryOutages
 from groundstation.systems.trajectory.estimate import Estimate
 from groundstation.systems.trajectory.figures import rows_shown
 from groundstation.systems.trajectory.model import DEG, Model
-from groundstation.systems.trajectory.observe import NO_ROW
 from groundstation.systems.trajectory.outages import Outages
-from groundstation.systems.trajectory.solution import FloatArray
 from groundstation.systems.trajectory.states import (
     BA,
     BG,
@@ -23,11 +21,8 @@ from groundstation.systems.trajectory.states import (
     MISALIGNED,
     MNT,
     NOT_SQUARE,
-    POSITION,
     SA,
     SG,
-    SLOW,
-    VELOCITY,
     WHL,
 )
 
@@ -104,48 +99,6 @@ def parameter_rows(estimate: Estimate) -> tuple[TrajectoryParameter, ...]:
     put(MNT, "travel in the unit, yaw", "mounting", "deg", DEG)
     put(MNT + 1, "travel in the unit, pitch", "mounting", "deg", DEG)
     return tuple(rows)
-
-
-def residuals_of(estimates: tuple[Estimate, ...]) -> TrajectoryResiduals:
-    """Return GNSS minus the smoothed solution at the antenna."""
-    parts = [_residuals(one) for one in estimates]
-    time_s, place, moving, used = (np.concatenate([part[i] for part in parts]) for i in range(4))
-    rows = rows_shown(time_s)
-    return TrajectoryResiduals(
-        time_s=time_s[rows],
-        position_north_m=place[rows, 0],
-        position_east_m=place[rows, 1],
-        position_down_m=place[rows, 2],
-        velocity_north_mps=moving[rows, 0],
-        velocity_east_mps=moving[rows, 1],
-        velocity_down_mps=moving[rows, 2],
-        is_used=used[rows],
-        is_held_out=np.zeros(len(rows), dtype=bool),
-    )
-
-
-def _residuals(estimate: Estimate) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return times, residuals of position and of velocity, and what was used."""
-    done = estimate.result
-    kind, linear = done.plan.seen.kind, done.linear
-    epoch, valid_s = done.plan.epoch, done.plan.valid_s
-    x = np.tile(done.constants - linear.value[-1], (len(done.plan.epoch_s), 1))
-    x[:, :KEPT_ROWS] = done.x
-    x[:, SLOW:MNT] = 0.0
-    predicted = (linear.h * np.take_along_axis(x[np.repeat(epoch, 3)], linear.columns, axis=1)).sum(axis=1)
-    error = np.where(np.abs(linear.z) < 0.5 * NO_ROW, linear.z - predicted, np.nan).reshape(-1, 3)
-    used = done.solved.mark.reshape(-1, 3).max(axis=1) == 1
-    position, velocity = np.flatnonzero(kind == POSITION), np.flatnonzero(kind == VELOCITY)
-    beside = np.full((len(position), 3), np.nan)
-    if len(velocity):
-        near = np.clip(np.searchsorted(valid_s[velocity], valid_s[position]), 0, len(velocity) - 1)
-        before = np.maximum(near - 1, 0)
-        closer = np.abs(valid_s[velocity[before]] - valid_s[position]) < np.abs(
-            valid_s[velocity[near]] - valid_s[position]
-        )
-        near = np.where(closer, before, near)
-        beside = error[velocity[near]]
-    return valid_s[position], error[position], beside, used[position]
 
 
 def biases_of(estimates: tuple[Estimate, ...]) -> TrajectoryBiases:

@@ -19,8 +19,10 @@ def sentence_of(answer: BestTrajectory) -> str:
         return f"two headings explain the log, {first} or {second} deg at the end: neither is claimed"
     if answer.state == "doubtful":
         return f"sigmas may be too small: {answer.reasons[0]}"
-    worst = opening_error(answer)
-    return accuracy_words(answer) if worst is None else error_words(answer, *worst)
+    worst, changed = opening_error(answer), opening_change(answer)
+    if worst is not None:
+        return error_words(answer, *worst)
+    return accuracy_words(answer) if changed is None else change_words(changed)
 
 
 def accuracy_words(answer: BestTrajectory) -> str:
@@ -53,6 +55,20 @@ def error_words(answer: BestTrajectory, row: OnboardError, span: WrongSpan) -> s
     return (
         f"on-board {row.quantity} wrong by {with_half(span.value, span.half95, row.unit)} {when(answer, span)} (95 %)"
     )
+
+
+def change_words(row: OnboardError) -> str:
+    """Return "on-board heading changed by 2.1 +- 0.2 deg at 6:36 (95 %): wrong before ..."."""
+    return f"on-board {row.quantity} {row.changed}"
+
+
+def opening_change(answer: BestTrajectory) -> OnboardError | None:
+    """Return the row whose change a report opens with, where no error does."""
+    if answer.state != "accepted" or answer.onboard is None or opening_error(answer) is not None:
+        return None
+    found = [(row.changes[0].over(row.quantity), row) for row in answer.onboard.rows if row.changes]
+    ratio, row = max(found, key=lambda one: one[0], default=(0.0, None))
+    return row if ratio >= 1.0 else None
 
 
 def when(answer: BestTrajectory, span: WrongSpan) -> str:

@@ -36,14 +36,16 @@ class Judge(Answer, ErrorsOfFilter):
     figures: tuple[FigureData, ...] = ()
 
     @property
-    def filter_topic(self) -> str:
-        return self.topic
+    def filter_topics(self) -> tuple[str, ...]:
+        return (self.topic,)
 
     @property
     def by_it(self) -> str:
         return "by a better unit"
 
-    def filter_errors(self) -> tuple[FilterError, ...]:
+    def filter_errors(self, topic: str) -> tuple[FilterError, ...]:
+        if topic != self.topic:
+            return ()
         return FilterError("heading", "deg", 1.23, 0.15, self.wrong, "yaw +0.40 deg"), POSITION
 
 

@@ -26,6 +26,7 @@ from groundstation.systems.trajectory.checks_answer import (
 )
 from groundstation.systems.trajectory.figures import accuracy_of, segments_of, separation_of, states_of, track_figure
 from groundstation.systems.trajectory.onboard import compare_onboard
+from groundstation.systems.trajectory.onboard_filters import filters_of
 from groundstation.systems.trajectory.solution import TrackOfStates
 from tests.report_example import example
 from tests.systems.trajectory.made import onboard, track
@@ -40,7 +41,7 @@ def accepted(of: TrackOfStates | None = None, *, heading_error_deg: float = 2.1,
     time_s = np.arange(states.time_s[0] + 1.0, states.time_s[-1] - 1.0, 0.1)
     wrong = np.where(time_s > time_s[0] + 0.66 * (time_s[-1] - time_s[0]), heading_error_deg, 0.0)
     flight = onboard(states, heading_error_deg=wrong, arm_m=(1.2, -0.4), delay_s=0.04)
-    compared = compare_onboard(states, flight, "ins")
+    compared = compare_onboard(states, flight, filters_of(flight)[0])
     rows, separation = separation_of(_forward(states), states)
     answer = BestTrajectory(
         state="accepted",

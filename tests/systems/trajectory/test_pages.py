@@ -19,7 +19,7 @@ from groundstation.results.schema import summary_schema
 from groundstation.systems.system import Systems
 from groundstation.systems.trajectory.answer import BestTrajectory
 from groundstation.systems.trajectory.chapter import trajectory
-from groundstation.systems.trajectory.onboard_answer import OnboardErrors, WrongSpan
+from groundstation.systems.trajectory.onboard_answer import ChangeOfConstant, OnboardErrors, WrongSpan
 from groundstation.systems.trajectory.plots import PLOTS
 from groundstation.systems.trajectory.system import SYSTEM
 from groundstation.systems.trajectory.wording_answer import sentence_of
@@ -65,9 +65,9 @@ def test_a_filter_that_is_wrong_opens_the_report() -> None:
     section = section_of(ANSWERS["accepted"])
     claim = section.claim
     assert claim is not None and claim.rank == Rank.ONBOARD_ERROR and claim.mark.text == "Filter wrong"
-    assert claim.headline == "On-board heading wrong by 2.1 ± 0.2° from 6:36 on (95 %)"
-    assert claim.value == "2.1 ± 0.2°" and not claim.is_danger
-    assert notes(section)[0] == "On-board heading wrong by 2.1 ± 0.2° from 6:36 on (95 %)."
+    assert claim.headline == "On-board heading wrong by 2.10 ± 0.19° from 6:36 on (95 %)"
+    assert claim.value == "2.10 ± 0.19°" and not claim.is_danger
+    assert notes(section)[0] == "On-board heading wrong by 2.10 ± 0.19° from 6:36 on (95 %)."
     assert "Best trajectory: heading to 0.3°, tilt to 0.10°, position to 0.6 m (95 %)." in claim.sentences
 
 
@@ -86,7 +86,7 @@ def test_a_small_error_is_told_in_the_chapter_and_does_not_open_the_report() -> 
     section = section_of(accepted(heading_error_deg=1.0))
     assert section.claim is not None and section.claim.rank == Rank.TRACK
     assert section.claim.headline.startswith("Heading to 0.3°, tilt to 0.10°, position to 0.6 m (95 %)")
-    assert notes(section)[0].startswith("On-board heading wrong by 1.0 ± 0.2° from 6:36 on")
+    assert notes(section)[0].startswith("On-board heading wrong by 1.00 ± 0.19° from 6:36 on")
 
 
 def test_a_doubtful_solution_says_so_first_and_blames_nobody() -> None:
@@ -205,3 +205,33 @@ def test_the_tab_has_both_tracks_and_every_page(name: str, tmp_path: Path) -> No
     assert any(path.startswith("/trajectory/onboard_attitude") for path in contents.batches) == has_filter
     text = contents.text("/trajectory/answer").replace("\\", "")
     assert sentence_of(ANSWERS[name]).split(" ")[0] in text
+
+
+def test_a_filter_that_changed_opens_the_report_without_a_wrong_span() -> None:
+    made = accepted()
+    assert made.onboard is not None
+    rows = tuple(
+        replace(one, spans=(), changes=(ChangeOfConstant(396.0, 2.1, 0.2),)) if one.quantity == "heading" else one
+        for one in made.onboard.rows
+    )
+    answer = replace(made, onboard=replace(made.onboard, rows=rows))
+    section = section_of(answer)
+    told = "On-board heading changed by 2.1 ± 0.2° at 6:36 (95 %): wrong before or after, which cannot be told"
+    assert section.claim is not None and section.claim.headline == told
+    assert section.claim.mark.text == "Filter changed"
+    (row,) = [one for one in grid(section, "Errors of the on-board").rows if one[0] == "Heading"]
+    assert "changed by 2.1" in getattr(row[-1], "text", "") and "nowhere" not in getattr(row[-1], "text", "")
+    assert any(note.startswith("On-board heading changed") for note in notes(section))
+
+
+def test_filters_stand_beside_each_other_with_the_one_that_flew_first() -> None:
+    made = accepted()
+    assert made.onboard is not None
+    first = replace(made.onboard, name="EKF3", flew=True, flew_source="AHRS_EKF_TYPE = 3")
+    other = replace(made.onboard, topic="ins.2", name="AHR2", flew=False)
+    section = section_of(replace(made, onboard=first, other_filters=(other,)))
+    shown = grid(section, "All filters of the log")
+    assert [row[:2] for row in shown.rows] == [("ins, EKF3", "yes"), ("ins.2, AHR2", "no")]
+    assert "heading" in str(shown.rows[0][-1])
+    assert "It flew the vehicle (AHRS_EKF_TYPE = 3)" in grid(section, "Errors of the on-board").caption
+    assert not [part for part in section_of(made).parts if getattr(part, "title", "") == "All filters of the log"]

@@ -9,8 +9,8 @@ from tests.systems.trajectory.made_answers import accepted, ambiguous, doubtful,
 
 def test_an_accepted_trajectory_tells_the_errors_that_its_own_page_tells() -> None:
     answer = accepted()
-    errors, opening = answer.filter_errors(), opening_error(answer)
-    assert answer.filter_topic == "ins" and answer.onboard is not None and opening is not None
+    errors, opening = answer.filter_errors("ins"), opening_error(answer)
+    assert answer.filter_topics == ("ins",) and answer.onboard is not None and opening is not None
     assert [(one.quantity, one.rms, one.sigma_rms) for one in errors] == [
         (row.quantity, row.rms, row.sigma_rms) for row in answer.onboard.rows
     ]
@@ -23,4 +23,4 @@ def test_an_accepted_trajectory_tells_the_errors_that_its_own_page_tells() -> No
 def test_no_errors_where_the_checks_do_not_hold(make: object) -> None:
     answer = make()  # type: ignore[operator]
     assert isinstance(answer, BestTrajectory)
-    assert answer.filter_topic == "" and (answer.onboard is None or answer.filter_errors() == ())
+    assert answer.filter_topics == () and answer.filter_errors("ins") == ()

@@ -61,7 +61,7 @@ def answered(tmp_path_factory: pytest.TempPathFactory) -> Answered:
 def test_the_aided_ins_is_judged_by_it(answered: Answered) -> None:
     best = answered.answers["trajectory"]
     assert isinstance(best, BestTrajectory) and best.state == "accepted"
-    (heading,) = [one for one in best.filter_errors() if one.quantity == "heading"]
+    (heading,) = [one for one in best.filter_errors("ins") if one.quantity == "heading"]
     worst = heading.wrong[0]
     assert worst.span_s[0] == pytest.approx(WRONG_FROM_S, abs=3.0) or worst.span_s[1] == pytest.approx(
         WRONG_FROM_S, abs=3.0
