@@ -49,7 +49,8 @@ class FixResiduals:
 def residuals_of(estimate: Estimate) -> FixResiduals:
     """Return the residuals of a segment.
 
-    Those of every tenth run of 10 s of GNSS are against a solution without it. The correction to the line is that of navigation and biases; the constants are those of the whole solution.
+    Those of every tenth run of 10 s of GNSS are against a solution without it. The correction to the line is that of
+    navigation and biases; the constants are those of the whole solution.
     """
     done = estimate.result
     times = done.plan.epoch_s
