@@ -1,8 +1,9 @@
 """Contradictions within a log: values that cannot all be true, though each is possible.
 
 A speed that its own positions do not show, a vehicle on wheels or fast in the air whose nose points away from its
-track, a vehicle that drives or flies on its side, a height that pressure does not follow. Mostly it is a unit, a sign
-or an axis that the log does not state as it is read. Nothing is changed and nothing is dropped.
+track, a vehicle that drives or flies on its side, a height that pressure does not follow, a vertical velocity with the
+other sign. Mostly it is a unit, a sign or an axis that the log does not state as it is read. Nothing is changed and
+nothing is dropped.
 """
 
 from collections.abc import Iterable, Mapping
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import direction_of, wrap_180
+from groundstation.base.climb import OPPOSITE, climb_agreement
 from groundstation.base.geodesy import METRES_PER_DEG
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.signals import kind_of
@@ -36,6 +38,7 @@ HEIGHT_M, HEIGHT_SHARE = 200.0, 0.2  # weather moves pressure altitude by less, 
 ANY = 1e7  # metres, metres per second or degrees
 HEADINGS = ("true_heading_deg", "magnetic_heading_deg")
 ALTITUDES = ("altitude_msl_m", "altitude_ellipsoid_m")
+DOWN = "velocity_down_mps"
 WHEELS = "odometry"  # kind of topic that only a vehicle on wheels has
 ROLLS = "rolls"
 
@@ -119,6 +122,7 @@ def contradictions(
         if kind_of(one.topic) == "ins":
             found.append(_side(one, windows, zero_ns))
             found.append(_heading(one, windows, does_roll, zero_ns))
+            found.append(_climb(one, zero_ns))
     found += [_height(one, series, zero_ns) for one in series if kind_of(one.topic) in ("gnss", "ins")]
     return tuple(one for one in found if one is not None)
 
@@ -227,6 +231,20 @@ def _heading(one: _Series, windows: Mapping[str, _Windows], does_roll: bool, zer
     kind = "a vehicle on wheels" if does_roll else f"an aircraft faster than {FAST_MPS:.0f} m/s"
     text = f"heading of {one.topic} is {usual:.0f} deg off the track of {kind}"
     return _told(one.topic, text, track.start_s, track.end_s, rows, zero_ns)
+
+
+def _climb(one: _Series, zero_ns: int) -> Contradiction | None:
+    """Find a downward velocity that has the sign of an upward one."""
+    name = next((name for name in ALTITUDES if one.has(name)), "")
+    if not name or not one.has(DOWN):
+        return None
+    known = one.known(name, DOWN)
+    found = climb_agreement(known.time_s, known.columns[name], known.columns[DOWN])
+    if found is None or found >= OPPOSITE:
+        return None
+    text = f"{DOWN} of {one.topic} goes up with its height (correlation with its rate of sinking {found:.2f})"
+    start_ns = zero_ns + round(float(known.time_s[0]) * NS_PER_S)
+    return Contradiction(one.topic, text, start_ns, float(known.time_s[-1] - known.time_s[0]))
 
 
 def _height(one: _Series, series: list[_Series], zero_ns: int) -> Contradiction | None:

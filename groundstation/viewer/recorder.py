@@ -145,7 +145,8 @@ class Recorder:
 
         The viewer has no hollow ones: they are crosses, twice as large.
         """
-        size, marker = (2.0 * line.width, "cross") if is_hollow else (line.width, "circle")
+        size = 2.0 * line.width if is_hollow else line.width
+        marker = rr.components.MarkerShape.Cross if is_hollow else rr.components.MarkerShape.Circle
         style = rr.SeriesPoints(names=[line.name], colors=[line.colour], marker_sizes=[size], markers=marker)
         self.static(path, style)
         self._scalars(path, time_ns, values[:, None])

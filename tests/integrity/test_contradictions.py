@@ -142,10 +142,28 @@ def test_the_robot_on_its_side_is_told() -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        *("reference_heading/pntos_drive_first_half.csv", "fixedwing/umn_thor_flight75.csv", "inertial/gv_ff02.csv"),
+        *("fixedwing/umn_thor_flight75.csv", "inertial/gv_ff02.csv"),
         *("g1000/log_220417_125002_LFQA.csv", "dataflash/plane_4.2.3_pilot0004.BIN", "ulog/quadrotor_local.ulg"),
     ],
 )
 def test_a_recorded_log_that_is_right_is_left_alone(name: str) -> None:
     found = ledger_findings(survey(read(real_log(name))).ledger)
     assert [finding.text for finding in found if finding.code == CONTRADICTION] == []
+
+
+def test_the_vertical_velocity_of_the_reference_drive_is_upward() -> None:
+    found = ledger_findings(survey(read(real_log("reference_heading/pntos_drive_first_half.csv"))).ledger)
+    (text,) = [finding.text for finding in found if finding.code == CONTRADICTION]
+    assert "velocity_down_mps of ins goes up with its height (correlation with its rate of sinking -1.00)" in text
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_vertical_velocity_with_the_other_sign_is_told(sign: float, tmp_path: Path) -> None:
+    time_s = np.arange(LENGTH_S * RATE_HZ) / RATE_HZ
+    climbing = {
+        **FLYING,
+        "ins.altitude_msl_m": 500.0 + 60.0 * np.sin(0.05 * time_s),
+        "ins.velocity_down_mps": -sign * 3.0 * np.cos(0.05 * time_s),
+    }
+    found = [one for one in told(climbing, tmp_path) if "velocity_down_mps of ins goes up" in one.text]
+    assert len(found) == (sign < 0)

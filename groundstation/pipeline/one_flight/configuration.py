@@ -96,11 +96,13 @@ class UserSettings:
 class References:
     """Files that may judge flights.
 
-    ``is_expected``: it is an error when none is of the time of the one log named.
+    ``is_expected``: it is an error when none is of the time of the one log named. ``topic`` is the one that judges;
+    empty: the best of each file.
     """
 
     paths: tuple[Path, ...] = ()
     is_expected: bool = False
+    topic: str = ""
 
     def besides(self, log: Path) -> "References":
         """Return these files without the log itself, which judges nothing.

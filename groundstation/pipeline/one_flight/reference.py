@@ -11,8 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from groundstation.base.angles import wrap_180
+from groundstation.base.climb import OPPOSITE, climb_agreement
 from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.findings import Finding
+from groundstation.base.geodesy import METRES_PER_DEG
 from groundstation.base.records import HEADING_IS_TRACK, MAX_BATCH_ROWS, Damage, Int64Array, RecordBatch
 from groundstation.base.signals import TOPICS, kind_of, topics_of_kind
 from groundstation.base.timescales import GPS_EPOCH_NS, gps_week_to_utc_ns, leap_seconds_at, utc_ns_to_iso
@@ -29,6 +32,9 @@ WEEK_NS = 604_800 * NS_PER_S
 NS_PER_MS = 1_000_000
 POSITION = ("latitude_deg", "longitude_deg")
 HEADING = "true_heading_deg"
+HEIGHTS = ("altitude_ellipsoid_m", "altitude_msl_m")
+DOWN = "velocity_down_mps"
+NEAR_M, NEAR_SHARE, LEAST_NEAR = 30.0, 0.95, 30  # of an INS from its GNSS, for so much of them, of so many
 ANGLES = (HEADING, "roll_deg")
 _FIELDS = frozenset(one.name for one in TOPICS[TRUTH])
 
@@ -103,14 +109,14 @@ def laid_beside(log_name: str, span_ns: tuple[int, int], has_utc: bool, referenc
     found, unread = [], []
     for path in references.paths:
         try:
-            table = _of_its_time(path, span_ns)
+            table = _of_its_time(path, span_ns, references.topic)
         except GroundstationError as error:
             if len(references.paths) == 1:
                 raise
             unread.append(Finding("warn", "reference.unreadable", str(error), TRUTH))
             continue
         if table is not None and len(table):
-            found.append((load_reference(path), table))
+            found.append((load_reference(path, references.topic), table))
     if len(found) > 1:
         names = ", ".join(reference.name for reference, _ in found)
         raise GroundstationError(log_name, f"several references cover its time: {names}", "one", "name the one to use")
@@ -118,38 +124,58 @@ def laid_beside(log_name: str, span_ns: tuple[int, int], has_utc: bool, referenc
         nothing = _nothing(log_name, span_ns, references)
         return replace(nothing, findings=(*unread, *nothing.findings))
     reference, table = found[0]
+    table, upward = _without_upward(reference.name, table)
     truth = Flight({TRUTH: replace(table, topic=TRUTH)}, {}, int(table.time_ns[0]), True)
-    findings = (*unread, *_findings(reference, table))
+    findings = (*unread, *_findings(reference, table), *upward)
     return Laid(tuple(batches_from_flight(truth, MAX_BATCH_ROWS)), reference.facts, findings)
 
 
-def _of_its_time(path: Path, span_ns: tuple[int, int]) -> "Table | None":
+def _of_its_time(path: Path, span_ns: tuple[int, int], named: str) -> "Table | None":
     """Return the part of a reference at the time of a log, on UTC; None without one.
 
     A file of another time is not read a second time.
     """
-    ends_ns, is_weekly = _ends_of(*_as_it_stands(path))
+    ends_ns, is_weekly = _ends_of(*_as_it_stands(path), named)
     spans = [_utc_of_week(week, ends_ns) for week in _weeks_about(span_ns)] if is_weekly else [ends_ns]
     if not any(first <= span_ns[1] and last >= span_ns[0] for first, last in spans):
         return None
-    return _cropped(_on_utc(load_reference(path), span_ns), span_ns)
+    return _cropped(_on_utc(load_reference(path, named), span_ns), span_ns)
+
+
+def _without_upward(name: str, table: "Table") -> "tuple[Table, tuple[Finding, ...]]":
+    """Return a reference without a downward velocity that goes up with its height, and a finding."""
+    height = next((one for one in HEIGHTS if table.has(one)), "")
+    if not height or not table.has(DOWN):
+        return table, ()
+    time_s = (table.time_ns - table.time_ns[0]) / NS_PER_S
+    found = climb_agreement(time_s, table.values(height), table.values(DOWN))
+    if found is None or found >= OPPOSITE:
+        return table, ()
+    text = (
+        f"{DOWN} of {name} goes up with its height (correlation with its rate of sinking {found:.2f}): vertical "
+        "velocity is not judged"
+    )
+    columns = {one: column for one, column in table.columns.items() if one != DOWN}
+    return replace(table, columns=columns), (Finding("warn", "reference.vertical_velocity", text, TRUTH),)
 
 
 def _nothing(log_name: str, span_ns: tuple[int, int], references: References) -> Laid:
     if references.is_expected:
-        names, theirs = (", ".join(map(tell, references.paths)) for tell in (_name_of, _span_text))
+        names, theirs = (
+            ", ".join(tell(path, references.topic) for path in references.paths) for tell in (_name_of, _span_text)
+        )
         when = " to ".join(utc_ns_to_iso(one, 0) for one in span_ns)
         raise GroundstationError(names, f"a reference that covers {theirs}", f"one that covers {log_name}, {when}")
     text = f"none of {len(references.paths)} references covers the time of this log"
     return Laid(findings=(Finding("info", "reference.none", text),))
 
 
-def _name_of(path: Path) -> str:
-    return load_reference(path).name
+def _name_of(path: Path, named: str) -> str:
+    return load_reference(path, named).name
 
 
-def _span_text(path: Path) -> str:
-    reference = load_reference(path)
+def _span_text(path: Path, named: str) -> str:
+    reference = load_reference(path, named)
     if reference.is_weekly:
         first, last = (one / NS_PER_S for one in (reference.table.time_ns[0], reference.table.time_ns[-1]))
         return f"seconds {first:.0f} to {last:.0f} of a GPS week"
@@ -171,15 +197,15 @@ def _findings(reference: Reference, table: "Table") -> list[Finding]:
     return found
 
 
-def load_reference(path: Path) -> Reference:
-    """Read a reference; the last few stay in memory.
+def load_reference(path: Path, named: str = "") -> Reference:
+    """Read a reference, by a topic that the user names or the best; the last few stay in memory.
 
     Raises
     ------
     UnreadableLogError
         When no reader claims it, or it holds neither positions, velocities nor attitude.
     """
-    return _load(*_as_it_stands(path))
+    return _load(*_as_it_stands(path), named)
 
 
 def _as_it_stands(path: Path) -> tuple[Path, int, int]:
@@ -192,18 +218,20 @@ def _as_it_stands(path: Path) -> tuple[Path, int, int]:
 
 
 @cache
-def _ends_of(path: Path, time_ns: int, size: int) -> tuple[Int64Array, bool]:
+def _ends_of(path: Path, time_ns: int, size: int, named: str) -> tuple[Int64Array, bool]:
     """Return first and last time of a file, shape (2,), and whether they are of a GPS week."""
-    reference = _load(path, time_ns, size)
+    reference = _load(path, time_ns, size, named)
     times_ns = reference.table.time_ns
     return np.array([times_ns.min(), times_ns.max()]), reference.is_weekly
 
 
 @lru_cache(maxsize=4)
-def _load(path: Path, _time_ns: int, _size: int) -> Reference:
+def _load(path: Path, _time_ns: int, _size: int, named: str) -> Reference:
     log = open_log(path)
     flight, damages, has_utc = _read(log)
-    topic = best_topic(flight)
+    if named and not (named in flight and len(flight[named])):
+        raise UnreadableLogError(path.name, f"no topic {named}", "the topic that [reference] names")
+    topic = named or best_topic(flight)
     if not topic:
         raise UnreadableLogError(path.name, "no position, velocity or attitude", "a reference")
     table = flight[topic].trusted()
@@ -253,12 +281,14 @@ def _read(log: Log) -> "tuple[Flight, tuple[Damage, ...], bool]":
 def best_topic(flight: "Flight") -> str:
     """Return the topic of a log that judges best.
 
-    Its truth, else an INS that GNSS corrects, else GNSS, else any. An INS left alone drifts; with GNSS in the same file
-    GNSS is the reference.
+    Its truth, else an INS that GNSS corrects, else GNSS, else any. With GNSS in the same file an INS is taken as
+    corrected by it where it stays near to it; one that drifts is not: then GNSS is the reference.
     """
     topics = [topic for topic in flight.topics() if len(flight[topic])]
     with_place = [topic for topic in topics if flight[topic].has(*POSITION)]
-    aided = [topic for topic in topics_of_kind("ins", with_place) if _is_aided(flight, topic)]
+    inertial = topics_of_kind("ins", with_place)
+    aided = [topic for topic in inertial if _is_aided(flight, topic)]
+    aided += [topic for topic in inertial if topic not in aided and _stays_near(flight, topic)]
     listed = (
         *topics_of_kind(TRUTH, topics),
         *aided,
@@ -272,6 +302,27 @@ def best_topic(flight: "Flight") -> str:
 def _is_aided(flight: "Flight", topic: str) -> bool:
     modes = flight[topic].text("mode")
     return flight.metadata.get("ins_kind") == "gnss_aided" or bool(np.mean(modes == "gnss_aided") > 0.5)
+
+
+def _stays_near(flight: "Flight", topic: str) -> bool:
+    """Tell whether an INS stays so near to the GNSS of its file as one that is corrected by it."""
+    if flight.metadata.get("ins_kind") == "unaided":
+        return False
+    ins = flight[topic]
+    for name in topics_of_kind("gnss", flight.topics()):
+        gnss = flight[name].trusted()
+        if not gnss.has(*POSITION) or len(gnss) < LEAST_NEAR or len(ins) < 2:
+            continue
+        row = np.searchsorted(ins.time_ns, gnss.time_ns).clip(0, len(ins) - 1)
+        beside = np.abs(ins.time_ns[row] - gnss.time_ns) <= NS_PER_S
+        latitude, longitude = (gnss.values(one) for one in POSITION)
+        north_deg = ins.values(POSITION[0])[row] - latitude
+        east_deg = wrap_180(ins.values(POSITION[1])[row] - longitude) * np.cos(np.deg2rad(latitude))
+        far_m = METRES_PER_DEG * np.hypot(north_deg, east_deg)[beside]
+        far_m = far_m[np.isfinite(far_m)]
+        if len(far_m) >= LEAST_NEAR:
+            return float(np.quantile(far_m, NEAR_SHARE)) <= NEAR_M
+    return False
 
 
 def _on_utc(reference: Reference, span_ns: tuple[int, int]) -> "Table":

@@ -12,10 +12,12 @@ UseArm = Literal["when_observed", "never"]
 class ReferenceSettings:
     """Settings of how a reference is aligned with a flight, and when it judges.
 
-    ``clock_offset_s`` is added to the reference's times. The arm leads from the reference's point to the GNSS antenna
-    of the log, in body axes; where none is stated it is estimated and taken out of the errors, if the turns show it.
+    ``topic`` of the reference's file judges; empty: the best one. ``clock_offset_s`` is added to the reference's times.
+    The arm leads from the reference's point to the GNSS antenna of the log, in body axes; where none is stated it is
+    estimated and taken out of the errors, if the turns show it.
     """
 
+    topic: str = ""
     clock_offset_s: float = number(0.0, -86_400.0, 86_400.0)
     arm_forward_m: float | None = number(None, -200.0, 200.0)
     arm_right_m: float | None = number(None, -200.0, 200.0)

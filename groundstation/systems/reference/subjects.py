@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_360
+from groundstation.base.climb import is_upward
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
 from groundstation.base.signals import topics_of_kind
@@ -20,6 +21,9 @@ from groundstation.tables.epochs import distinct_epochs
 from groundstation.tables.headings import true_heading
 from groundstation.tables.table import Flight, Table
 from groundstation.tables.tracks import HasTracks, ins_table
+
+HEIGHTS = ("altitude_ellipsoid_m", "altitude_msl_m")
+DOWN = "velocity_down_mps"
 
 
 def subjects_of(flight: Flight, known: Known) -> Iterator[tuple[str, Table]]:
@@ -59,6 +63,13 @@ def _ins(flight: Flight, topic: str) -> Table:
     table = flight[topic]
     heading = _true_heading(flight, topic)
     columns = {**table.columns, "true_heading_deg": Column(heading, np.isfinite(heading))}
+    height = next((name for name in HEIGHTS if table.has(name)), "")
+    if (
+        height
+        and table.has(DOWN)
+        and is_upward(flight.seconds(table.time_ns), table.values(height), table.values(DOWN))
+    ):
+        del columns[DOWN]  # its sign is told as a contradiction of the log
     return replace(table, columns=columns).trusted()
 
 

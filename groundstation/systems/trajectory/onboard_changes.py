@@ -103,8 +103,8 @@ class Absolute:
 
 
 @dataclass(frozen=True)
+class Judged:
     """Spans of the filter, changes of its constant, and the constant that is right instead."""
-    """Spans that are the filter's, changes of a constant, and the constant that is right instead."""
 
     spans: tuple[WrongSpan, ...]
     changes: tuple[ChangeOfConstant, ...] = ()

@@ -293,8 +293,8 @@ def residuals(results: FlightResults) -> Plot | None:
                 marks.append(Dots(x=data.time_s, y=np.where(chosen, values, np.nan), role=role, name=name))
         held = np.flatnonzero(data.is_held_out & np.isfinite(values))
         if len(held):
-            place = {"x": data.time_s[held], "y": values[held]}
-            marks.append(Points(**place, symbol="ring", role="answer", name="held out", is_hollow=True))
+            x, y = data.time_s[held], values[held]
+            marks.append(Points(x=x, y=y, symbol="ring", role="answer", name="held out", is_hollow=True))
         low, high = symmetric(usual(values), 1e-3)
         panel = Panel(marks, ends, Axis(axis, low=low, high=high), legend="" if rows else "above")
         rows.append(Row((panel,), 20.0, shares_x=axis != known[-1][0]))

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.base.records import Column
-from groundstation.base.timescales import GPS_EPOCH_NS, leap_seconds_at
+from groundstation.base.timescales import GPS_EPOCH_NS, leap_seconds_at, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.cli.main import app
 from groundstation.pipeline.many_flights.runs.references import judged_by
@@ -276,3 +276,52 @@ def test_a_log_for_which_a_reference_is_expected_is_not_finished_by_a_run_that_e
     refused = CliRunner().invoke(app, ["run", str(log), *run])
     assert refused.exit_code == 1
     assert "a reference that covers" in refused.output
+
+
+def two_in_one(flown: Flight, path: Path, *, drift_m: float = 0.0, sign: float = 1.0) -> Path:
+    """A flat table with an INS and the GNSS that corrects it; the INS may drift, its vertical velocity be upward."""
+    truth = flown["truth"].unique_times()
+    truth = truth.take(slice(0, None, max(1, len(truth) // 3000)))
+    time_s = (truth.time_ns - truth.time_ns[0]) / NS_PER_S
+    latitude, longitude = (truth.values(f"{name}_deg") for name in ("latitude", "longitude"))
+    height, down = 200.0 + 60.0 * np.sin(0.05 * time_s), -sign * 3.0 * np.cos(0.05 * time_s)
+    off = drift_m / 111_000.0 * time_s / time_s[-1]
+    ins = ("latitude_deg", "longitude_deg", "altitude_ellipsoid_m", "velocity_down_mps")
+    gnss = ("latitude_deg", "longitude_deg", "horizontal_sigma_m")
+    head = ["time_s", *(f"ins.{name}" for name in ins), *(f"gnss.{name}" for name in gnss)]
+    lines = [f"# start_utc: {utc_ns_to_iso(int(truth.time_ns[0]), 9)}", ",".join(head)]
+    for row in zip(time_s, latitude + off, longitude, height, down, latitude, longitude, strict=True):
+        lines.append(",".join(f"{value:.9f}" for value in row) + ",1.0")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(("drift_m", "topic"), [(5.0, "ins"), (900.0, "gnss")])
+def test_of_a_file_with_both_the_ins_judges_unless_it_drifts(
+    drift_m: float, topic: str, folder: Path, flown: Flight, tmp_path: Path
+) -> None:
+    reference = two_in_one(flown, tmp_path / "both.csv", drift_m=drift_m)
+    _, flight = converted(folder / "flight.csv", tmp_path / "a.mcap", reference)
+    assert flight.metadata["truth.topic"] == topic
+    named = References((reference,), is_expected=True, topic="gnss")
+    made = convert_log(open_log(folder / "flight.csv"), tmp_path / "b.mcap", references=named)
+    assert read_flight(tmp_path / "b.mcap", made).metadata["truth.topic"] == "gnss"
+    with pytest.raises(GroundstationError, match=r"no topic gnss\.7"):
+        convert_log(open_log(folder / "flight.csv"), tmp_path / "c.mcap", references=replace(named, topic="gnss.7"))
+
+
+def test_a_user_names_the_topic_of_a_reference(folder: Path) -> None:
+    configuration = Configuration({"reference": {"topic": "gnss"}})
+    found = judged_by(configuration, [folder / "references"], is_one_log=True)
+    assert found.references.topic == "gnss" and found.references.is_expected
+
+
+def test_a_reference_whose_vertical_velocity_is_upward_does_not_judge_it(
+    folder: Path, flown: Flight, tmp_path: Path
+) -> None:
+    for sign, is_kept in ((1.0, True), (-1.0, False)):
+        reference = two_in_one(flown, tmp_path / f"both{sign:.0f}.csv", sign=sign)
+        made, flight = converted(folder / "flight.csv", tmp_path / f"a{sign:.0f}.mcap", reference)
+        assert flight["truth"].has("velocity_down_mps") == is_kept
+        told = [one.text for one in made.findings if one.code == "reference.vertical_velocity"]
+        assert len(told) == (not is_kept) and all("vertical velocity is not judged" in one for one in told)

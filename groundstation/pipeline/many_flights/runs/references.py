@@ -44,4 +44,5 @@ def judged_by(configuration: Configuration, references: Sequence[Path], *, is_on
         found.append(one.path)
     if not found:
         raise UsageError(", ".join(map(str, references)), "no reference in it")
-    return replace(configuration, references=References(tuple(found), is_expected=is_one_log))
+    topic = str(configuration.tables.get("reference", {}).get("topic", ""))
+    return replace(configuration, references=References(tuple(found), is_one_log, topic))
