@@ -37,7 +37,9 @@ def _is_px4(flight: Flight) -> bool:
 
 
 def _is_ros(flight: Flight) -> bool:
-    return any(topic.startswith("raw.") and "/" in topic for topic in flight.topics())
+    """Tell whether a log is a bag: its topics have types, or names with a slash."""
+    has_types = any(key.startswith("type.raw.") and "/" in text for key, text in flight.metadata.items())
+    return has_types or any(topic.startswith("raw.") and "/" in topic for topic in flight.topics())
 
 
 RECORDERS = (
@@ -73,9 +75,20 @@ RECORDERS = (
         "enable UBX-NAV-PVT",
     ),
     Recorder(
-        "NovAtel", _any_topic("raw.BEST", "raw.INSPVA"), "log RAWIMUSXB ONNEW, or CORRIMUS", "log BESTVELB ONTIME 0.2"
+        "NovAtel",
+        _any_topic("raw.BEST", "raw.INSPVA"),
+        "log RAWIMUSXB ONNEW; CORRIMUDATA, which has gravity taken off, and RAWIMU, which does not "
+        "tell its scale, do not serve",
+        "log BESTVELB ONTIME 0.2",
     ),
 )
+COCKPIT = Recorder(
+    "cockpit recorder",
+    _any_topic("raw.g1000", "raw.dynon"),
+    "a cockpit recorder keeps no rates and no specific force: carry a recorder with an inertial unit at 100 Hz or more "
+    "and a receiver of its own",
+)
+RECORDERS = (*RECORDERS, COCKPIT)
 ANY = Recorder(
     "",
     lambda _: True,

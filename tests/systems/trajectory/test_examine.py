@@ -20,7 +20,13 @@ from tests.systems.trajectory.made_answers import accepted, ambiguous, doubtful,
 
 ORDINARY = Configuration()
 FORMATS = {"PX4": "raw.ulog.parameters", "ArduPilot": "raw.FMT", "MAVLink telemetry": "raw.HEARTBEAT"}
-FORMATS |= {"ROS": "raw.gnss/fix", "u-blox": "raw.NAV-PVT", "NovAtel": "raw.BESTPOS", "": "raw.g1000"}
+FORMATS |= {
+    "ROS": "raw.gnss/fix",
+    "u-blox": "raw.NAV-PVT",
+    "NovAtel": "raw.BESTPOS",
+    "cockpit recorder": "raw.g1000",
+    "": "raw.pos",
+}
 
 
 @pytest.fixture(scope="module")
@@ -100,6 +106,11 @@ def test_each_format_is_told_what_to_log(flight: Flight, name: str) -> None:
     recorder = recorder_of(bare)
     assert recorder.name == name and recorder in (*RECORDERS, ANY)
     assert told(bare) == ("no", [f"no inertial unit (topic imu) in the log: {recorder.imu}"])
+
+
+def test_a_bag_is_known_by_the_types_of_its_topics(flight: Flight) -> None:
+    bare = replace(changed(flight, "imu", None), metadata={"type.raw.fix": "sensor_msgs/NavSatFix (cdr)"})
+    assert recorder_of(bare).name == "ROS"
 
 
 def test_columns_have_what_the_log_shows() -> None:
