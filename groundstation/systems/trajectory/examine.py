@@ -42,7 +42,7 @@ def _is_ros(flight: Flight) -> bool:
     return has_types or any(topic.startswith("raw.") and "/" in topic for topic in flight.topics())
 
 
-RECORDERS = (
+RECORDERS: tuple[Recorder, ...] = (
     Recorder(
         "PX4",
         _is_px4,
@@ -84,7 +84,7 @@ RECORDERS = (
 )
 COCKPIT = Recorder(
     "cockpit recorder",
-    _any_topic("raw.g1000", "raw.dynon"),
+    _any_topic("raw.g1000", "raw.g3x", "raw.g5", "raw.skyview", "raw.avidyne"),
     "a cockpit recorder keeps no rates and no specific force: carry a recorder with an inertial unit at 100 Hz or more "
     "and a receiver of its own",
 )
