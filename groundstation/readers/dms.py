@@ -18,7 +18,7 @@ from groundstation.readers.layout import number_of
 
 _POWERS = 10.0 ** np.arange(16)  # a whole number of 15 digits over one of these is the double next to the decimal
 _NOTHING, _PLAIN, _PARTS, _OTHER = 0, 1, 2, 3  # states of a cell
-COMPILED_ROWS = 5_000  # below them a compiler takes longer than it saves
+COMPILED_ROWS = 10_000  # below them the other way takes a moment, and a compiler some seconds once
 
 
 def is_quick(missing: Sequence[str], rows: int) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 from groundstation.base.compile import in_place
 from groundstation.base.records import Int64Array
 
-COMPILED_BYTES = 1 << 18  # below it numpy takes a moment, and a compiler some seconds
+COMPILED_BYTES = 1 << 20  # below it numpy takes a moment, and a compiler some seconds once
 _LF = 10
 
 

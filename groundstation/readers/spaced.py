@@ -5,7 +5,7 @@ they begin are those of the file. Where cells of fixed width touch, the lines ar
 """
 
 import io
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -27,8 +27,9 @@ _BLANK, _TAB, _LF, _CR = 32, 9, 10, 13
 _NUMERIC = np.frombuffer(b"0123456789+-.", np.uint8)
 _BEFORE_BYTES = 1 << 16  # looked at before a place for the beginning of its line
 _PIECE_BYTES = 1 << 20
+_WRITTEN_BYTES = 4 << 20
 _LINE_BYTES = 16  # of a line, at least, in most tables
-_MOST_TABS = 1 << 26  # in a piece
+_MOST_BYTES = 1 << 26  # of a piece with tabs
 
 
 @dataclass(frozen=True)
@@ -268,14 +269,14 @@ class FixedSource(MadeSource):
         file, size = unnamed_file(), 0
         with self.whole.open() as stream:
             rest = b""
-            while data := stream.read(_PIECE_BYTES):
+            while data := stream.read(_WRITTEN_BYTES):
                 end = data.rfind(b"\n") + 1
-                if not end and len(rest) < _PIECE_BYTES:
+                if not end and len(rest) < _WRITTEN_BYTES:
                     rest += data
                     continue
-                size += file.write(self._parted(rest + data[:end] if end else rest))
+                size += sum(map(file.write, self._parted(rest + data[:end] if end else rest)))
                 rest = data[end:] if end else data
-        size += file.write(self._parted(rest))
+        size += sum(map(file.write, self._parted(rest)))
         file.flush()
         return file, size
 
@@ -283,14 +284,15 @@ class FixedSource(MadeSource):
         """Return the lines, and their shape."""
         return lines, shape_of(lines, "\t", is_compiled=True)
 
-    def _parted(self, lines: bytes) -> bytes:
-        """Return lines with a tab between the columns."""
+    def _parted(self, lines: bytes) -> Iterator[bytes]:
+        """Yield lines with a tab between the columns."""
         bounds = (0, *np.cumsum(self.widths)[:-1].tolist())
-        count = lines.count(b"\n")
-        if len(lines) < COMPILED_BYTES or count * len(bounds) > _MOST_TABS or not lines.endswith(b"\n"):
-            return b"".join(_parted_line(line, bounds) for line in io.BytesIO(lines))
-        text, made = np.frombuffer(lines, np.uint8), np.empty(len(lines) + count * len(bounds), np.uint8)
-        return made[: part(text, made, np.array(bounds, np.int64), b'"' in lines)].tobytes()
+        most = len(lines) + lines.count(b"\n") * len(bounds)
+        if len(lines) < COMPILED_BYTES or most > _MOST_BYTES or not lines.endswith(b"\n"):
+            yield from (_parted_line(line, bounds) for line in io.BytesIO(lines))
+            return
+        text, made = np.frombuffer(lines, np.uint8), np.empty(most, np.uint8)
+        yield made[: part(text, made, np.array(bounds, np.int64), b'"' in lines)].tobytes()
 
 
 def _parted_line(line: bytes, bounds: Sequence[int]) -> bytes:

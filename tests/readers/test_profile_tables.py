@@ -1,16 +1,19 @@
 """Tables as people have them: blanks, fixed widths, GPS weeks, degrees and minutes, counters, several vehicles."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from groundstation.base import arrow_values
 from groundstation.base.errors import SettingsError
 from groundstation.base.records import NewLog, RecordBatch
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.survey import survey
-from groundstation.readers import csv_profile, profile_file, registry, rows, spaced
+from groundstation.readers import cells, csv_profile, dms, profile_file, registry, row_shapes, rows, spaced
+from groundstation.readers.row_shapes import cell_places, shape_of
 from groundstation.readers.source import Source
 from groundstation.readers.spaced import SpacedSource
 from tests.readers.test_flat_csv import Read
@@ -91,6 +94,135 @@ def test_columns_of_fixed_width_may_touch_or_be_empty(tmp_path: Path) -> None:
     assert found.values("gnss", "longitude_deg") == [-122.25, -122.5]
     assert found.values("gnss", "altitude_ellipsoid_m") == [10.0, None]
     assert found.times("gnss") == [NS_PER_S, 2 * NS_PER_S]
+
+
+@pytest.mark.parametrize(
+    ("last", "count"), [("   2 48.0000-122.", 0), ("   2 48.0000", 0), ("   2 48.0000-122.2500  1", 1)]
+)
+def test_a_row_of_fixed_width_that_is_cut_is_lost_as_others_are(tmp_path: Path, last: str, count: int) -> None:
+    text = f'name = "p"\n[recognise]\nwidths = [4, 8, 9, 6]\n{BASIC[11:]}[columns]\n{PLACES}'.replace("dms", "deg")
+    found = read(tmp_path, text, f"   t     lat      lon     h\n   1 47.5000-122.2500  10.0\n{last}")
+    assert len(found.values("gnss", "latitude_deg")) == 1 + count
+    if count:
+        assert "no_final_newline" in found.remarks and not found.damages
+    else:
+        assert found.damage("truncated").count == 1
+
+
+def numbers_of(rng: np.random.Generator, rows: int) -> list[list[str]]:
+    """Cells of three columns, some of them empty."""
+    return [
+        [f"{number}", f"{rng.uniform(-90.0, 90.0):.{rng.integers(1, 9)}f}", rng.choice(["", "-1.5", "nan"])]
+        for number in range(rows)
+    ]
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_many_rows_of_fixed_width_are_parted_as_few_are(monkeypatch: pytest.MonkeyPatch, end: str) -> None:
+    rng = np.random.default_rng(5)
+    rows = ["".join(cell.rjust(14) for cell in row).rstrip() for row in numbers_of(rng, 200)]
+    lines = end.join([*rows, "", "# note  of   blanks", " a    text ", "  -  3", ""]).encode()
+    source = spaced.FixedSource(Path("x"), Source(Path("x")), (14, 14, 14))
+    plain = b"".join(source._parted(lines))
+    monkeypatch.setattr(spaced, "COMPILED_BYTES", 0)
+    compiled = b"".join(source._parted(lines))
+    assert trimmed_cells(compiled) == trimmed_cells(plain) and len(compiled) < len(plain)
+    kept = [line for line in plain.splitlines() if b"te" in line]
+    assert [line for line in compiled.splitlines() if b"te" in line] == kept
+
+
+def trimmed_cells(lines: bytes) -> list[list[bytes]]:
+    """Cells between tabs; a carriage return ends a line too."""
+    return [
+        [b" ".join(cell.split()) for cell in line.split(b"\t")] for line in lines.replace(b"\r", b"\n").split(b"\n")
+    ]
+
+
+def test_many_lines_with_blanks_are_tabbed_as_few_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng, alphabet = np.random.default_rng(3), np.frombuffer(b"    \t12-x#\n\n\r.\x1a", np.uint8)
+    for _ in range(300):
+        lines = bytes(rng.choice(alphabet, rng.integers(0, 200))) + b"\n"
+        source = SpacedSource(Path("x"), Source(Path("x")), *((0, ()), (4, (0, 1)), (3, (1,)))[rng.integers(3)])
+        monkeypatch.setattr(spaced, "COMPILED_BYTES", 1 << 20)
+        plain, none = source.rows(lines)
+        monkeypatch.setattr(spaced, "COMPILED_BYTES", 0)
+        assert none is None and spaced.tabbed(lines, source.cells, source.joined) == plain
+        tight, shape = source.rows(lines)
+        counted = shape_of(tight, "\t")
+        assert trimmed_cells(tight) == trimmed_cells(plain) and shape is not None
+        assert (shape.ends.tolist(), shape.cells.tolist()) == (counted.ends.tolist(), counted.cells.tolist())
+        ours, theirs = (re.split(rb"[\r\n]", one) for one in (tight, plain))
+        assert [line for line in ours if line[:1] == b"#"] == [line for line in theirs if line[:1] == b"#"]
+
+
+def test_shapes_by_compiled_loops_are_those_by_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = b"1,ab,3\n,,\n4,c d,\n"
+    plain, places = shape_of(lines, ","), cell_places(lines, ",", 3, 1)
+    monkeypatch.setattr(row_shapes, "COMPILED_BYTES", 0)
+    compiled = shape_of(lines, ",", is_compiled=True)
+    assert compiled.ends.tolist() == plain.ends.tolist() and compiled.cells.tolist() == plain.cells.tolist() == [3] * 3
+    assert [one.tolist() for one in cell_places(lines, ",", 3, 1)] == [one.tolist() for one in places]
+
+
+ANGLES = (
+    *(
+        "-0 30 00",
+        "47:12:36.0",
+        "8 30.5 W",
+        "12°30′18″S",
+        "-8.5",
+        "47 61 0",
+        "47 12 60",
+        "N 1 2 3",
+        "- 1 2",
+        "+5",
+        "-5",
+    ),
+    *(
+        "1.",
+        "nan",
+        "5e1",
+        "0x1",
+        "é",
+        "",
+        "  ",
+        "8d30m12s",
+        "8d30m12.25s w",
+        "8 30 s",
+        "8:30",
+        "8:30:",
+        "1000 2 3",
+        "\t7",
+    ),
+    *(
+        "3 4 5.123456789012345",
+        "8 30 12 5",
+        "12.5 30",
+        "S12 30",
+        "12 30 S N",
+        "8 5.",
+        "8'30",
+        "8 30'12\"",
+        "x",
+        "1234.56 ",
+    ),
+)
+
+
+@pytest.mark.parametrize("missing", [(), ("x", "9999")])
+def test_many_angles_are_read_as_few_are(missing: tuple[str, ...]) -> None:
+    rng = np.random.default_rng(4)
+    columns = [(one,) for one in ANGLES] + [tuple(rng.choice(ANGLES, 20)) for _ in range(50)]
+    assert dms.is_quick(missing, dms.COMPILED_ROWS) and not dms.is_quick(("9 9 9",), dms.COMPILED_ROWS)
+    for column in columns:
+        text = arrow_values.texts(column)
+        few = cells.degrees(cells.cleaned(text, missing))
+        many = dms.degrees(text, lambda part: cells.cleaned(part, missing))
+        assert (
+            many.unreadable.tolist() == few.unreadable.tolist()
+            and many.column.mask.tolist() == few.column.mask.tolist()
+        )
+        assert many.column.values.tobytes() == few.column.values.tobytes(), column
 
 
 WEEKS = (
