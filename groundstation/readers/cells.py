@@ -128,7 +128,7 @@ def degrees_and_minutes(text: Any) -> TableCells:
     Examples
     --------
     >>> read = degrees_and_minutes(pa.array(["4730.6", "-00815.0", "12215.6W", "4761.0", None]))
-    >>> read.column.values.tolist(), read.unreadable.tolist()
+    >>> read.column.values.round(6).tolist(), read.unreadable.tolist()
     ([47.51, -8.25, -122.26, nan, nan], [False, False, False, True, False])
     """
     parts = pc.extract_regex(text, r"^\s*(?P<number>[+-]?\d+(?:\.\d*)?)\s*(?P<side>[NSEWnsew]?)\s*$")

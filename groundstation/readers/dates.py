@@ -19,8 +19,14 @@ _CLOCK = re.compile(
 )
 
 
-def _time_of_day_ns(text: str, formats: tuple[str, ...]) -> int | None:
-    """Return the time since midnight of ``14:13:51.25``, ``2:13:51 PM`` or ``141351.25``."""
+def clock_ns(text: str, formats: tuple[str, ...] = ()) -> int | None:
+    """Return the time since midnight of ``14:13:51.25``, ``2:13:51 PM`` or ``141351.25``.
+
+    Examples
+    --------
+    >>> clock_ns("00:00:01.5"), clock_ns("12:00:01 AM"), clock_ns("000001"), clock_ns("12:03")
+    (1500000000, 1000000000, 1000000000, None)
+    """
     match = _CLOCK.fullmatch(text)
     if match is None:
         return None
@@ -70,7 +76,7 @@ def local_ns(date: Any, time: Any, offset: Any | None, date_formats: tuple[str, 
     ([1624454031000000000, 0], [True, False])
     """
     days, has_day, bad_day = _each_distinct(date, day_ns, date_formats)
-    times, has_time, bad_time = _each_distinct(time, _time_of_day_ns, ())
+    times, has_time, bad_time = _each_distinct(time, clock_ns, ())
     unreadable = bad_day | bad_time
     if offset is None:
         offsets = np.zeros(len(days), dtype=np.int64)
@@ -110,5 +116,5 @@ def time_of_day_ns(text: Any) -> TableCells:
     >>> time_of_day_ns(pa.array(["00:00:01.5", "later", None])).column.values.tolist()
     [1500000000, 0, 0]
     """
-    values, known, unreadable = _each_distinct(text, _time_of_day_ns, ())
+    values, known, unreadable = _each_distinct(text, clock_ns, ())
     return TableCells(Column(values, known), unreadable)

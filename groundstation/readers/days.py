@@ -1,6 +1,6 @@
-"""Days: the beginning of one told as text, and the days that pass in times of the day."""
+"""Days and weeks that pass in times of the day and of the week; a day that is told as text."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 
 import numpy as np
@@ -9,6 +9,7 @@ from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
 
 _DAY_NS = 86_400 * NS_PER_S
+_WEEK_NS, _NEAR_NS = 7 * _DAY_NS, 3600 * NS_PER_S  # an hour about the end of a week
 _LAST_NS = 2**62 - _DAY_NS  # as that of times in cells
 _EPOCH_DAY = datetime(1970, 1, 1).toordinal()
 
@@ -32,12 +33,51 @@ def day_ns(text: str, formats: tuple[str, ...]) -> int | None:
 
 
 @dataclass
+class WeekCount:
+    """Week that a writer counts late: its seconds begin anew at midnight of Saturday, and the week stays.
+
+    ``late`` is the week that stands for the one after it, ``rows`` counts the rows that have it.
+    """
+
+    late: int | None = None
+    rows: int = 0
+    _last: tuple[int, int] = (-1, 0)
+
+    def to_add(self, week: Int64Array, second_ns: Int64Array) -> Int64Array:
+        """Return the weeks to add to those of rows, shape (n,).
+
+        Examples
+        --------
+        >>> hour = 3600 * NS_PER_S
+        >>> seconds = np.array([168 * hour - 1, 0, hour, 2 * hour])
+        >>> WeekCount().to_add(np.array([7, 7, 7, 8]), seconds).tolist()
+        [0, 1, 1, 0]
+        """
+        found = np.zeros(len(week), dtype=np.int64)
+        if not len(week):
+            return found
+        before, second_before = np.append(self._last[0], week[:-1]), np.append(self._last[1], second_ns[:-1])
+        is_turn = (week == before) & (second_before > _WEEK_NS - _NEAR_NS) & (second_before < _WEEK_NS)
+        is_turn &= second_ns < _NEAR_NS
+        self._last = int(week[-1]), int(second_ns[-1])
+        if self.late is None and not is_turn.any():
+            return found
+        for at in np.flatnonzero(is_turn | (week != before) | (np.arange(len(week)) == 0)).tolist():
+            number = int(week[at])
+            self.late = number if is_turn[at] else self.late if number == self.late else None
+            found[at:] = self.late is not None
+        self.rows += int(found.sum())
+        return found
+
+
+@dataclass
 class DayCount:
     """Days that have passed since the first row, where rows tell the time of the day alone.
 
     A time that is most of a day before the one above is of the next day; a clock that is set goes back by less.
     """
 
+    weeks: WeekCount = field(default_factory=WeekCount)
     _last_ns: int = -1
     _days: int = 0
 

@@ -12,7 +12,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.readers import cells
 from groundstation.readers.cells import TableCells
 from groundstation.readers.dates import local_ns, parted, time_of_day_ns
-from groundstation.readers.days import DayCount
+from groundstation.readers.days import DayCount, WeekCount
 from groundstation.readers.layout import TimeRule
 
 _MOST_WEEKS, _MOST_WEEK_NS = 10_000, 2 * 604_800 * NS_PER_S  # some writers let the seconds run on over the week
@@ -34,7 +34,7 @@ def times_of(rule: TimeRule, texts: Sequence[Any], days: DayCount) -> tuple[Tabl
     if rule.kind == "nanoseconds":
         return cells.integers_ns(texts[0]), 0
     if rule.kind == "gps_week":
-        return _of_week(rule, texts), 0
+        return _of_week(rule, texts, days.weeks), 0
     if rule.kind == "time_of_day":
         return _of_day(rule, texts[0], days), 0
     if rule.kind == "utc_fraction":
@@ -58,13 +58,14 @@ def utc_of(texts: Sequence[Any], date_formats: tuple[str, ...]) -> tuple[TableCe
     return read, 0 if offset is None else int(np.count_nonzero(read.column.mask & ~arrow.is_valid(offset)))
 
 
-def _of_week(rule: TimeRule, texts: Sequence[Any]) -> TableCells:
+def _of_week(rule: TimeRule, texts: Sequence[Any], weeks: WeekCount) -> TableCells:
     """Return UTC of GPS weeks and seconds of the week."""
     week, second = cells.numbers(texts[0]), cells.decimal_ns(texts[1], rule.digits, rule.multiple)
     number = np.where(week.column.mask & np.isfinite(week.column.values), week.column.values, -1.0)
     is_week = (number >= 0.0) & (number < _MOST_WEEKS) & (number == np.floor(number))
     is_second = second.column.mask & (second.column.values >= 0) & (second.column.values < _MOST_WEEK_NS)
     present = is_week & is_second
+    number[present] += weeks.to_add(number[present].astype(np.int64), second.column.values[present])
     whole_ms, rest_ns = np.divmod(np.where(present, second.column.values, 0), 1_000_000)
     utc_ns = gps_week_to_utc_ns(np.where(present, number, 0.0).astype(np.int64) + rule.weeks, whole_ms) + rest_ns
     filled = arrow.is_valid(texts[0]) & arrow.is_valid(texts[1])

@@ -255,6 +255,20 @@ def test_weeks_that_rolled_over_are_moved_and_told(tmp_path: Path) -> None:
     assert kept.times("gnss") == [iso_to_utc_ns("2004-09-20T10:00:05Z")[0]]  # 13 leap seconds at that time
 
 
+def test_a_week_that_stays_at_midnight_of_saturday_is_counted_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Some writers keep the week of the first row: the seconds begin anew, also between two blocks of rows."""
+    monkeypatch.setattr(rows, "BLOCK_BYTES", 60)
+    seconds = [604_790 + k for k in range(20)]
+    table = "w,s,v\n" + "".join(f"2313,{s % 604_800},1\n" for s in seconds) + "2314,10,1\n2313,9,1\n"
+    found = read(tmp_path, WEEKS, table)
+    times = np.array(found.times("gnss"))
+    assert np.diff(times[:21]).tolist() == [NS_PER_S] * 20 and times[21] < times[0]  # the last row is of its own week
+    assert found.remarks["late_week"].text.startswith("10 rows")
+    assert "late_week" not in read(tmp_path, WEEKS, "w,s,v\n2313,604799,1\n2314,0,1\n2313,604799,1\n").remarks
+
+
 @pytest.mark.parametrize(
     ("unit", "text"), [("s", "1714989600.5"), ("ms", "1714989600500"), ("ns", "1714989600500000000")]
 )

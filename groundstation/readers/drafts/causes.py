@@ -81,9 +81,9 @@ def cause_of_times(cells: Sequence[str]) -> str:
         "unclear": f"dates of which day and month cannot be told apart, such as {example}",
     }
     if order := date_order(cells):
-        return f"{orders[order]}: write them as 2026-05-04 12:00:00, or date and time of day in two columns"
+        return f'{orders[order]}: read them by kind = "local" with date_formats, or write them as 2026-05-04 12:00:00'
     if _most(cells, _CLOCK.fullmatch):
-        return f"times of day without a date, such as {example}: add a column with the date"
+        return f'times of day without a date, such as {example}: read them by kind = "time_of_day", or add the date'
     if _most(cells, _COMMA.fullmatch):
         return f"numbers with a decimal comma in quotes, such as {example}: save them with a decimal point"
     return ""

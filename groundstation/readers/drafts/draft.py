@@ -7,6 +7,8 @@ question mark in the draft.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from groundstation.readers.drafts.column import ColumnGuess
 from groundstation.readers.drafts.guesses import Guesses
 from groundstation.readers.drafts.sample import sample_of
@@ -51,6 +53,7 @@ class Draft:
         return (*told, *(f"{one.name}: {one.doubt}" for one in self.columns if one.doubt))
 
 
+@np.errstate(all="ignore")  # a table may hold any number
 def draft_of(source: Source, names: Sequence[str] = ()) -> Draft:
     """Return the draft of a profile for a table, with names for one that has none.
 

@@ -66,7 +66,8 @@ def in_unit(sample: TableSample, guess: ColumnGuess, other: ColumnGuess | None) 
 
 def _largest(sample: TableSample, guess: ColumnGuess) -> float:
     values = np.abs(sample.numbers(guess.at))
-    return float(np.nanpercentile(values, 99)) if np.isfinite(values).any() else 0.0
+    known = values[np.isfinite(values)]
+    return float(np.percentile(known, 99)) if len(known) else 0.0
 
 
 def _is_run_together(sample: TableSample, guess: ColumnGuess) -> bool:

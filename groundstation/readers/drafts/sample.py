@@ -70,6 +70,7 @@ class TableSample:
     above: tuple[str, ...] = ()
     are_given: bool = False
     _numbers: dict[int, FloatArray] = field(default_factory=dict)
+    _signs: dict[int, frozenset[str]] = field(default_factory=dict)
 
     @cached_property
     def has_decimal_comma(self) -> bool:
@@ -118,8 +119,13 @@ class TableSample:
         signs = self.signs(at)
         return [cell for cell in self.columns[at] if cell and cell not in signs]
 
-    def signs(self, at: int) -> set[str]:
+    def signs(self, at: int) -> frozenset[str]:
         """Return the signs for missing values: words, and nines that are far from all others."""
+        if at not in self._signs:
+            self._signs[at] = frozenset(self._found_signs(at))
+        return self._signs[at]
+
+    def _found_signs(self, at: int) -> set[str]:
         words = {cell for cell in self.columns[at] if cell.lower() in MISSING}
         nines = {cell for cell in self.columns[at] if _NINES.fullmatch(cell)}
         if not nines:

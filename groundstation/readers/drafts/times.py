@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from groundstation.base import arrow_values as arrow
 from groundstation.base.angles import FloatArray
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.toml_text import quoted
 from groundstation.base.units import NS_PER_S
-from groundstation.readers.dates import time_of_day_ns
+from groundstation.readers.dates import clock_ns
 from groundstation.readers.days import day_ns
 from groundstation.readers.drafts.causes import cause_of_times, date_order
 from groundstation.readers.drafts.sample import ENOUGH, TableSample
@@ -321,8 +320,8 @@ def _six_digits(cells: list[str]) -> tuple[str, str]:
 
 
 def _clock_seconds(cell: str) -> float:
-    value = time_of_day_ns(arrow.texts([cell.strip()])).column
-    return float(value.values[0]) / NS_PER_S if value.mask[0] else np.nan
+    value = clock_ns(cell.strip())
+    return np.nan if value is None else value / NS_PER_S
 
 
 def _are(sample: TableSample, at: int, pattern: re.Pattern[str], share: float = ENOUGH) -> bool:
