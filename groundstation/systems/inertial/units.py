@@ -1,6 +1,7 @@
 """Several INS of one flight: each against the reference, in pairs, and which one is off."""
 
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from groundstation.systems.inertial.units_verdict import growth_faults, own_faul
 from groundstation.tables.sources import AIDED
 
 DEFAULT_LIMITS = "navigation"  # of a class that was not simulated
+LEAST_S = 120.0  # of two units together
 
 
 def judge_units(
@@ -61,12 +63,15 @@ def judge_units(
     tracks = [one for one in units if len(one.time_s) > 1]
     if len(tracks) < 2:
         raise NotAssessableError("ins_units", f"{len(tracks)} INS with samples", "two or more")
+    together_s = _longest_together_s(tracks)
+    if together_s < LEAST_S:
+        raise NotAssessableError("ins_units", f"{together_s:.0f} s of two INS together", f"at least {LEAST_S:.0f} s")
     limits_class = ins_class if limits_of(ins_class, 1.0, is_start_known=True) is not None else DEFAULT_LIMITS
     found = prepare(tracks, reference)
     by_reference = against_reference(found, _noise(reference), limits_class)
     pairs = in_pairs(found, limits_class)
     if all(one.shown is None for one in (*pairs, *by_reference.values())):
-        raise NotAssessableError("ins_units", "no two units overlap", "two units at the same time")
+        raise NotAssessableError("ins_units", "no two INS with values at the same time")
     faults = own_faults(found, reference) + growth_faults(found, by_reference, pairs, reference)
     judged = sum(bool(one.ratios) for one in pairs)
     states = _states(found, faults, by_reference, pairs)
@@ -83,6 +88,13 @@ def judge_units(
         ins_class_origin=ins_class_origin if limits_class == ins_class else f"{ins_class} was not simulated",
         false_alarm_share=share_of_limits(),
         figures=figures_of(found),
+    )
+
+
+def _longest_together_s(tracks: Sequence[UnitTrack]) -> float:
+    return max(
+        float(min(one.time_s[-1], other.time_s[-1]) - max(one.time_s[0], other.time_s[0]))
+        for one, other in combinations(tracks, 2)
     )
 
 

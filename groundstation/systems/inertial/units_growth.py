@@ -45,7 +45,7 @@ class Growth:
     largest_m : Measured or None
     largest_at_s : float or None
     is_drift : bool
-        Whether a Schuler wave from the start on leaves most of the velocity unexplained: a tilt makes such a wave.
+        Whether its velocity is more that of a gyro's drift than that of a tilt at the start.
     """
 
     hours: float
@@ -151,7 +151,10 @@ def _of_velocity(time_s: FloatArray, velocity_mps: FloatArray, noise: Noise) -> 
     length_s = max(float(np.ptp(time_s)), MEAN_S)
     few = min(2.0 * noise.velocity_s / length_s, 1.0)  # one over the number of independent errors
     half = NORMAL_95 * noise.velocity_mps * np.sqrt(few) + noise.velocity_mps**2 / max(rms, noise.velocity_mps, 1e-9)
-    found: dict[str, object] = {"velocity_mps": Measured(rms, float(half)), "is_drift": _grows(time_s, velocity_mps)}
+    found: dict[str, object] = {
+        "velocity_mps": Measured(rms, float(half)),
+        "is_drift": _is_drift(time_s, velocity_mps, rms),
+    }
     if length_s >= LEAST_PERIOD * SCHULER_S:
         turn = 2.0 * np.pi * time_s / SCHULER_S
         wave = np.column_stack([np.cos(turn), np.sin(turn)])
@@ -161,17 +164,20 @@ def _of_velocity(time_s: FloatArray, velocity_mps: FloatArray, noise: Noise) -> 
         spread = noise.velocity_mps * np.sqrt(float(np.max(np.linalg.eigvalsh(gain))) * 2.0 * noise.velocity_s / MEAN_S)
         amplitude = float(np.sqrt(np.sum(fitted[2:] ** 2)))
         found["schuler_mps"] = Measured(amplitude, float(NORMAL_95 * spread))
-        left = velocity_mps - wave @ np.linalg.lstsq(wave, velocity_mps, rcond=None)[0]
-        found["is_drift"] = bool(np.sqrt(np.mean(np.sum(left**2, axis=1))) > MOSTLY * rms)
     return found
 
 
-def _grows(time_s: FloatArray, velocity_mps: FloatArray) -> bool:
-    """Tell whether the velocity grows faster than a tilt makes it grow in a short time.
+def _is_drift(time_s: FloatArray, velocity_mps: FloatArray, rms: float) -> bool:
+    """Tell whether velocity errors are more those of a gyro's drift than those of a tilt at the start.
 
-    Drift makes it grow with the square of time, tilt with time.
+    A tilt, or an error of velocity, makes a wave from the start on; drift makes its velocity grow to one side.
     """
-    share = time_s / max(float(time_s[-1]), 1.0)
-    design = np.column_stack([np.ones(len(share)), share, share**2])
-    fitted = np.linalg.lstsq(design, velocity_mps, rcond=None)[0]
-    return bool(np.hypot(*fitted[2]) > np.hypot(*fitted[0]) + np.hypot(*fitted[1]))
+    turn = 2.0 * np.pi * time_s / SCHULER_S
+
+    def left(*columns: FloatArray) -> float:
+        design = np.column_stack(columns)
+        rest = velocity_mps - design @ np.linalg.lstsq(design, velocity_mps, rcond=None)[0]
+        return float(np.sqrt(np.mean(np.sum(rest**2, axis=1))))
+
+    by_tilt, by_drift = left(np.sin(turn), np.cos(turn)), left(1.0 - np.cos(turn))
+    return by_tilt > min(by_drift, MOSTLY * rms)

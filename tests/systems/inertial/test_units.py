@@ -1,0 +1,183 @@
+"""Several INS of one flight: which one is off, by what, and what is no fault."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from groundstation.base.errors import NotAssessableError
+from groundstation.systems.inertial.study import units_limits as study
+from groundstation.systems.inertial.units import judge_units
+from groundstation.systems.inertial.units_answer import UnitsResult
+from groundstation.systems.inertial.units_growth import Noise, growth_of
+from groundstation.systems.inertial.units_limits import limits_of
+from groundstation.systems.inertial.units_log import serials_of
+from groundstation.systems.inertial.units_track import UnitTrack
+from tests.systems.inertial.units_example import (
+    Change,
+    Errors,
+    drift_of,
+    gnss,
+    kicked,
+    stepped,
+    still,
+    stuck,
+    swapped,
+    tilt_of,
+    unit,
+    units,
+    without_position,
+)
+
+
+def kinds(found: UnitsResult) -> dict[tuple[str, ...], set[str]]:
+    return {one.topics: {other.kind for other in found.faults if other.topics == one.topics} for one in found.faults}
+
+
+@pytest.mark.parametrize("number", [2, 3])
+@pytest.mark.parametrize("has_gnss", [True, False])
+def test_honest_units_agree(number: int, has_gnss: bool) -> None:
+    found = judge_units(units(number, known=has_gnss), gnss() if has_gnss else None)
+    assert (found.verdict, found.off, found.faults) == ("agree", (), ())
+    assert [one.state for one in found.units] == ["good"] * number
+    assert len(found.pairs) == number * (number - 1) // 2 and not any(one.is_beyond for one in found.pairs)
+
+
+@pytest.mark.parametrize(
+    ("bad", "kind"),
+    [(drift_of(0.3), "drift"), (tilt_of(1200.0), "tilt"), (stepped(300.0), "step"), (kicked(2.0), "step")],
+)
+def test_errors_of_one_of_three_are_named_with_and_without_gnss(bad: Errors, kind: str) -> None:
+    for reference in (gnss(), None):
+        found = judge_units(units(3, bad=bad), reference)
+        assert found.verdict == "off" and found.off == ("ins.1",), found.sentence
+        assert kinds(found) == {("ins.1",): {kind}}
+        assert found.sentence.startswith("ins.1 is off: ")
+
+
+@pytest.mark.parametrize(("change", "kind"), [(swapped, "swapped_axis"), (stuck, "stuck"), (still, "frozen")])
+@pytest.mark.parametrize("number", [2, 3])
+def test_a_unit_that_contradicts_itself_is_named_even_of_two(change: Change, kind: str, number: int) -> None:
+    found = judge_units(units(number, change=change), None)
+    assert kinds(found) == {("ins.1",): {kind}}, found.sentence
+
+
+def test_two_units_that_differ_are_one_of_the_two_until_gnss_tells() -> None:
+    bad = units(2, bad=drift_of(0.3))
+    alone = judge_units(bad, None)
+    assert alone.verdict == "one_of" and alone.off == ("ins", "ins.1")
+    assert [one.state for one in alone.units] == ["one_of", "one_of"]
+    assert "one of ins and ins.1 is off" in alone.sentence
+    assert judge_units(bad, gnss()).off == ("ins.1",)
+
+
+def test_steps_have_their_size_inside_their_interval() -> None:
+    for metres in (100.0, 1000.0):
+        (fault,) = judge_units(units(2, bad=stepped(metres)), None).faults
+        assert fault.start_s == pytest.approx(2000.0, abs=1.0) and fault.unit == "m"
+        assert fault.value is not None and fault.value == pytest.approx(metres, abs=0.5)
+
+
+@pytest.mark.parametrize(("late_s", "ppm"), [(5.0, 0.0), (-0.5, 0.0), (0.0, 300.0)])
+def test_clocks_that_differ_are_told_and_taken_off(late_s: float, ppm: float) -> None:
+    def change(one: UnitTrack) -> UnitTrack:
+        return replace(one, time_s=one.time_s * (1.0 + 1e-6 * ppm) + late_s)
+
+    found = judge_units(units(3, change=change), gnss())
+    late = found.unit("ins.1").lag_s
+    assert late is not None and late.value == pytest.approx(late_s + 1e-6 * ppm * 1800.0, abs=0.02)
+    assert found.verdict == "agree", found.sentence
+    rate, plain = (judge_units(one, gnss()).unit("ins.1").rate_fit_nmiph for one in (units(3, change=change), units(3)))
+    assert rate is not None and plain is not None and rate.value == pytest.approx(plain.value, abs=0.02)
+
+
+def test_a_unit_that_repeats_another_is_no_witness() -> None:
+    made = units(2)
+    twin = replace(made[0], topic="ins.2", time_s=made[0].time_s + 0.2)
+    found = judge_units([*made, twin], None)
+    assert found.unit("ins.2").same_as == "ins" and found.unit("ins.2").state == "copy"
+    bad = units(2, bad=drift_of(0.3))
+    assert judge_units([*bad, twin], None).verdict == "one_of"  # two votes of one unit do not outvote the other
+
+
+def test_a_unit_that_gnss_corrects_is_never_the_good_one() -> None:
+    made = units(2, bad=drift_of(0.3))
+    aided = replace(unit("ins", (np.zeros((3600, 2)), np.zeros((3600, 2))), 5), kind="gnss_aided")
+    alone = judge_units([aided, made[1]], None)
+    assert alone.verdict == "not_judged" and alone.unit("ins").state == "aided"
+    assert alone.pairs[0].why_not == "GNSS corrects ins"
+    assert judge_units([aided, made[1]], gnss()).off == ("ins.1",)
+
+
+def test_a_unit_without_position_is_compared_by_velocity() -> None:
+    found = judge_units(units(2, change=without_position), gnss())
+    assert found.verdict == "agree" and not found.unit("ins.1").has_position
+    assert found.unit("ins.1").rate_fit_nmiph is None and found.unit("ins.1").velocity_rms_mps is not None
+    bad = units(3, bad=tilt_of(1200.0), change=without_position)
+    assert judge_units(bad, None).off == ("ins.1",)
+
+
+def test_a_receiver_that_jumps_is_not_taken_for_a_unit() -> None:
+    reference = gnss()
+    velocity = reference.velocity_mps.copy()
+    velocity[1500:] += 3.0
+    found = judge_units(units(2), replace(reference, velocity_mps=velocity))
+    assert not [one for one in found.faults if one.kind == "step"], found.sentence
+
+
+def test_rate_of_a_unit_is_that_of_its_errors() -> None:
+    position, velocity = drift_of(0.05)
+    growth = growth_of(np.arange(3600.0), position, velocity, Noise(3.0, 0.02, 300.0, 60.0))
+    assert growth is not None and growth.rate_nmiph is not None
+    hours, nmi = np.arange(3600.0) / 3600.0, np.hypot(*position.T) / 1852.0
+    assert growth.rate_nmiph.value == pytest.approx(float(np.sum(hours * nmi) / np.sum(hours**2)), rel=2e-3)
+    assert growth.is_drift and growth.schuler_mps is None
+
+
+def test_amplitude_of_a_tilt_is_known_from_most_of_a_schuler_period_on() -> None:
+    growth = growth_of(np.arange(9000.0), *tilt_of(200.0, 9000))
+    assert growth is not None and growth.schuler_mps is not None and not growth.is_drift
+    assert growth.schuler_mps.value == pytest.approx(9.8 * 5064.0 / 2.0 / np.pi * 200e-6, rel=5e-3)
+
+
+def test_limits_are_the_quantiles_of_the_same_statistics() -> None:
+    """The limits' own short way to a rate and a velocity gives what the analysis gives."""
+    time_s = np.arange(0.0, 7300.0, 2.0)
+    position, velocity = (np.repeat(part, 1, axis=0) for part in drift_of(0.02, 7300))
+    errors = position[::2][: len(time_s)], velocity[::2][: len(time_s)], np.full(len(time_s), 0.1)
+    told = study.statistics_of(time_s[:3650], tuple(part[:3650] for part in errors), 0.0, is_known=True)  # type: ignore[arg-type]
+    rows = time_s <= 3600.0
+    growth = growth_of(time_s[rows], errors[0][rows], errors[1][rows])
+    assert growth is not None and growth.rate_nmiph is not None and growth.velocity_mps is not None
+    place = study.HOURS.index(1.0)
+    assert told[place, 0] == pytest.approx(growth.rate_nmiph.value, rel=0.01)
+    assert told[place, 1] == pytest.approx(growth.velocity_mps.value, rel=0.01)
+
+
+def test_limits_grow_with_ignorance_and_are_known_for_every_class() -> None:
+    for name in study.CLASSES:
+        known, unknown = (limits_of(name, 2.0, is_start_known=one) for one in (True, False))
+        assert known is not None and unknown is not None
+        assert known.pair.rate_nmiph > known.single.rate_nmiph > 0.0
+        assert unknown.single.rate_nmiph > known.single.rate_nmiph
+    assert limits_of("my own", 2.0, is_start_known=True) is None
+
+
+def test_serials_that_change_in_flight() -> None:
+    assert serials_of("") == ()
+    assert serials_of("A1, B2 from 900.5 s") == ((0.0, "A1"), (900.5, "B2"))
+
+
+def test_too_little_is_a_reason() -> None:
+    made = units(2)
+    with pytest.raises(NotAssessableError, match="1 INS with samples"):
+        judge_units(made[:1])
+    short = [replace(one, **{name: getattr(one, name)[:60] for name in _ROWS}) for one in made]
+    with pytest.raises(NotAssessableError, match="59 s of two INS together, expected at least 120 s"):
+        judge_units(short, gnss())
+    apart = [made[0], replace(made[1], time_s=made[1].time_s + 1e5)]
+    with pytest.raises(NotAssessableError, match="together"):
+        judge_units(apart, None)
+
+
+_ROWS = ("time_s", "latitude_deg", "longitude_deg", "velocity_mps", "heading_deg")
