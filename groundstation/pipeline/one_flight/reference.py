@@ -143,7 +143,7 @@ def _of_its_time(path: Path, span_ns: tuple[int, int], named: str) -> "Table | N
 
 
 def _without_upward(name: str, table: "Table") -> "tuple[Table, tuple[Finding, ...]]":
-    """Return a reference without a downward velocity that goes up with its height, and a finding."""
+    """Leave out a downward velocity that goes up with the height; return the finding too."""
     height = next((one for one in HEIGHTS if table.has(one)), "")
     if not height or not table.has(DOWN):
         return table, ()
@@ -198,7 +198,7 @@ def _findings(reference: Reference, table: "Table") -> list[Finding]:
 
 
 def load_reference(path: Path, named: str = "") -> Reference:
-    """Read a reference, by a topic that the user names or the best; the last few stay in memory.
+    """Read a reference by a named topic or the best; the last few stay in memory.
 
     Raises
     ------
@@ -305,7 +305,7 @@ def _is_aided(flight: "Flight", topic: str) -> bool:
 
 
 def _stays_near(flight: "Flight", topic: str) -> bool:
-    """Tell whether an INS stays so near to the GNSS of its file as one that is corrected by it."""
+    """Tell whether an INS stays as near to the GNSS of its file as a corrected one."""
     if flight.metadata.get("ins_kind") == "unaided":
         return False
     ins = flight[topic]
