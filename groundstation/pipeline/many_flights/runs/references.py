@@ -11,6 +11,7 @@ from groundstation.base.errors import UnclaimedLogError, UsageError
 from groundstation.pipeline.many_flights.inputs import collect
 from groundstation.pipeline.one_flight.configuration import Configuration, References
 from groundstation.pipeline.one_flight.log import open_log
+from groundstation.systems import systems
 
 
 def judged_by(configuration: Configuration, references: Sequence[Path], *, is_one_log: bool) -> Configuration:
@@ -44,5 +45,11 @@ def judged_by(configuration: Configuration, references: Sequence[Path], *, is_on
         found.append(one.path)
     if not found:
         raise UsageError(", ".join(map(str, references)), "no reference in it")
-    topic = str(configuration.tables.get("reference", {}).get("topic", ""))
-    return replace(configuration, references=References(tuple(found), is_one_log, topic))
+    return replace(configuration, references=References(tuple(found), is_one_log, _topic_of(configuration)))
+
+
+def _topic_of(configuration: Configuration) -> str:
+    """Return the topic that the user names in the settings of what judges; empty without."""
+    judging = (one.settings_table for one in systems().analyses if one.judges)
+    named = (getattr(configuration.settings.analyses[table], "topic", "") for table in judging)
+    return next(filter(None, named), "")
