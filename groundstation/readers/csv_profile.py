@@ -415,7 +415,10 @@ def laid(source: Source, profile: Profile) -> tuple[Fit, TableLayout]:
     UnreadableLogError
         When the file has no header row with the columns that the profile asks for.
     """
-    fit = _joined(source, _fitted(source, profile))
-    seen = _seen(source, profile, fit.cells, fit.joined)
-    utc_of_zero_ns, _remarks = _utc_of_zero(fit, fit.metadata)
-    return fit, layout_of(fit, seen, utc_of_zero_ns, None)[0]
+    try:
+        fit = _joined(source, _fitted(source, profile))
+        seen = _seen(source, profile, fit.cells, fit.joined)
+        utc_of_zero_ns, _remarks = _utc_of_zero(fit, fit.metadata)
+        return fit, layout_of(fit, seen, utc_of_zero_ns, None)[0]
+    finally:
+        source.seen.clear()
