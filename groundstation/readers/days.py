@@ -1,4 +1,4 @@
-"""Days and weeks that pass in times of the day and of the week; a day that is told as text."""
+"""Days and weeks that pass in times of the day and of the week; a day told as text."""
 
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -34,9 +34,10 @@ def day_ns(text: str, formats: tuple[str, ...]) -> int | None:
 
 @dataclass
 class WeekCount:
-    """Week that a writer counts late: its seconds begin anew at midnight of Saturday, and the week stays.
+    """Week that a writer counts late.
 
-    ``late`` is the week that stands for the one after it, ``rows`` counts the rows that have it.
+    Its seconds begin anew at midnight of Saturday, and the week stays. ``late`` is the week that stands for the one
+    after it, ``rows`` counts the rows that have it.
     """
 
     late: int | None = None
