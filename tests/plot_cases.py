@@ -26,8 +26,8 @@ from groundstation.simulation.session import simulate_session
 from groundstation.systems.cooperative.analysis import COOPERATIVE
 from groundstation.systems.gnss.answer import GnssReception
 from groundstation.systems.health.answer import AutopilotHealth
-from groundstation.systems.known import SessionKnown
 from groundstation.systems.inertial.units import judge_units
+from groundstation.systems.known import SessionKnown
 from groundstation.systems.landing.answer import LandingResult
 from groundstation.systems.landing.arrays import LandingPath, LandingProtection
 from groundstation.systems.plan import Planned
