@@ -26,6 +26,7 @@ from groundstation.simulation.session import simulate_session
 from groundstation.systems.cooperative.analysis import COOPERATIVE
 from groundstation.systems.gnss.answer import GnssReception
 from groundstation.systems.health.answer import AutopilotHealth
+from groundstation.systems.inertial.units import judge_units
 from groundstation.systems.known import SessionKnown
 from groundstation.systems.landing.answer import LandingResult
 from groundstation.systems.landing.arrays import LandingPath, LandingProtection
@@ -38,6 +39,7 @@ from groundstation.systems.several_logs.answer import Together
 from groundstation.tables.table import Flight
 from tests import report_example, viewer_example
 from tests.systems.inertial.example import aided_figures, forecast_result, inertial_result
+from tests.systems.inertial.units_example import drift_of, gnss, units
 
 MOST_GENERIC = 3  # figures of an answer without a chapter: all are told alike
 LAKE = KeepOut("lake", ((-1800.0, 500.0), (-1800.0, 1400.0), (-1000.0, 1400.0)))
@@ -60,6 +62,12 @@ def aided() -> FlightResults:
     """An INS that GNSS corrects, and no heading."""
     results = report_example.example()
     return replace(results, figures=(*results.figures, *aided_figures(results.duration_s)))
+
+
+@cache
+def several_units() -> FlightResults:
+    """Three INS, one of which drifts."""
+    return report_example.example(judge_units(units(3, bad=drift_of(0.3)), gnss()))
 
 
 @cache
@@ -307,6 +315,7 @@ CASES: dict[str, Callable[[], FlightResults]] = {
     "crowd": crowd,
     "trajectory": trajectory,
     "at_rest": at_rest,
+    "units": several_units,
 }
 
 
@@ -316,12 +325,14 @@ def names_of(name: str, results: FlightResults) -> list[tuple[str, ...]]:
         known = (
             one
             for one in results.figure_names
-            if not one.startswith(("gnss_", "health_", "trajectory_"))  # whose chapters draw them
+            if not one.startswith(("gnss_", "health_", "trajectory_", "units_"))  # whose chapters draw them
             and (found := results.figure_with_rows(one)) is not None
             and "time_s" in found.columns
             and columns_by_unit(found)
         )
         return [(one,) for one in list(known)[:MOST_GENERIC]]
+    if name in ("units.errors", "units.pairs"):
+        return [(quantity,) for quantity in ("radial", "velocity", "heading")]
     if name in ("inertial.state", "inertial.differences"):
         return [("position",), ("velocity",)]
     if name.startswith("landing."):

@@ -38,6 +38,7 @@ RUN = ("taxi-good", "taxi-short")  # logs that the suite runs anyway
 SAVED = (
     "report",
     "aided",
+    "units",
     "magnetic",
     "ground",
     "flux",

@@ -20,7 +20,7 @@ from groundstation.systems.inertial.units_growth import Noise
 from groundstation.systems.inertial.units_limits import limits_of, share_of_limits
 from groundstation.systems.inertial.units_prepare import Comparable, Prepared, prepare
 from groundstation.systems.inertial.units_track import ReferenceTrack, UnitTrack
-from groundstation.systems.inertial.units_verdict import growth_faults, own_faults, sentence_of, size_of
+from groundstation.systems.inertial.units_verdict import growth_faults, is_common, own_faults, sentence_of, size_of
 from groundstation.tables.sources import AIDED
 
 DEFAULT_LIMITS = "navigation"  # of a class that was not simulated
@@ -75,9 +75,11 @@ def judge_units(
     faults = own_faults(found, reference) + growth_faults(found, by_reference, pairs, reference)
     judged = sum(bool(one.ratios) for one in pairs)
     states = _states(found, faults, by_reference, pairs)
+    common = is_common(by_reference, pairs)
     return UnitsResult(
         verdict=_verdict(faults, states),
-        sentence=sentence_of(faults, by_reference, judged, reference),
+        sentence=sentence_of(faults, by_reference, judged, reference, common=common),
+        is_common=common,
         off=tuple(topic for topic, state in states.items() if state in ("off", "one_of")),
         units=tuple(_unit(one, states[one.topic], by_reference.get(one.topic)) for one in found.units),
         pairs=tuple(_told(found, pair) for pair in pairs),

@@ -1,7 +1,7 @@
 """Answer on several INS of one flight: each against GNSS, in pairs, and which one is off."""
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
@@ -159,6 +159,8 @@ class UnitsResult(Answer):
         The same in words.
     false_alarm_share : float
         Share of the flights of honest units in which a single limit is exceeded.
+    is_common : bool
+        Whether all units are beyond their limits against the reference and agree with each other.
     """
 
     analysis: ClassVar[str] = "ins_units"
@@ -175,7 +177,7 @@ class UnitsResult(Answer):
     ins_class: str
     ins_class_origin: str
     false_alarm_share: float
-    settings: dict[str, Any] = field(default_factory=dict)
+    is_common: bool = False
     figures: tuple[FigureData, ...] = ()
 
     def unit(self, topic: str) -> InsUnit:

@@ -9,6 +9,7 @@ from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.units import judge_units
 from groundstation.systems.inertial.units_answer import InsFault, InsUnit, UnitsResult
 from groundstation.systems.inertial.units_log import GNSS, unit_class, unit_reference, unit_topics, unit_tracks
+from groundstation.systems.inertial.units_verdict import COMMON
 from groundstation.systems.known import Known
 from groundstation.tables.sources import AIDED, choose_source
 from groundstation.tables.table import Flight
@@ -30,6 +31,8 @@ def compare_units(flight: Flight, known: Known, settings: InertialSettings) -> t
     found = judge_units(tracks, reference, ins_class=noise.name, ins_class_origin=origin)
     changes = {one.topic: one.serials for one in tracks}
     findings = [_of_fault(one) for one in found.faults]
+    if found.is_common:
+        findings.append(Finding("warn", "ins_units.common", COMMON, found.against, count=len(found.units)))
     for unit in found.units:
         findings += _of_unit(unit, changes[unit.topic])
     return found, tuple(findings)

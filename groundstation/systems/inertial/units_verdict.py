@@ -13,7 +13,9 @@ from groundstation.systems.inertial.units_prepare import Comparable, Prepared, S
 from groundstation.systems.inertial.units_track import ReferenceTrack
 
 CLEARLY_MORE = 2.0  # times as far over its limits as the others' pairs, for parity to name a unit
+AGREE = 0.5  # of what they are over their limits against the reference: units that agree with each other
 COVERS = 0.8  # of the hours of a pair that the reference must cover to acquit both
+COMMON = "all are beyond their limits and agree with each other: the reference, or what they share, is wrong"
 EXCHANGE_S = 5.0  # a step so near a change of serials is the other unit
 
 
@@ -74,8 +76,9 @@ def growth_faults(
     """
     faults = []
     named = []
+    common = is_common(by_reference, pairs)
     for topic, judged in by_reference.items():
-        if judged.is_beyond:
+        if judged.is_beyond and not common:
             faults.append(_growth_fault(judged, (topic,), f"against {'' if reference is None else reference.title}"))
             named.append(topic)
     left = [one for one in beyond(pairs, named) if not _are_acquitted(one, by_reference)]
@@ -91,6 +94,18 @@ def growth_faults(
     )
     faults.append(_growth_fault(worst, who, by))
     return faults
+
+
+def is_common(by_reference: Mapping[str, Judged], pairs: Sequence[Judged]) -> bool:
+    """Tell whether all units are beyond their limits against the reference and agree with each other.
+
+    Then the reference is wrong, or what the units share: the place or the levelling of their alignment.
+    """
+    judged = [one for one in by_reference.values() if one.ratios]
+    between = [pair.over for pair in pairs if pair.ratios]
+    if len(judged) < 2 or not between or not all(one.is_beyond for one in judged):
+        return False
+    return max(between) < AGREE * min(one.over for one in judged)
 
 
 def _are_acquitted(pair: Judged, by_reference: Mapping[str, Judged]) -> bool:
@@ -146,11 +161,17 @@ def _growth_fault(judged: Judged, topics: tuple[str, ...], by: str) -> InsFault:
 
 
 def sentence_of(
-    faults: Sequence[InsFault], by_reference: Mapping[str, Judged], judged_pairs: int, reference: ReferenceTrack | None
+    faults: Sequence[InsFault],
+    by_reference: Mapping[str, Judged],
+    judged_pairs: int,
+    reference: ReferenceTrack | None,
+    *,
+    common: bool = False,
 ) -> str:
     """Return the verdict in a sentence."""
     if not faults:
-        return _agreement(by_reference, judged_pairs, reference)
+        told = _agreement(by_reference, judged_pairs, reference)
+        return f"{told}; {COMMON}" if common else told
     sentences = []
     for topics in dict.fromkeys(fault.topics for fault in faults):
         own = [fault for fault in faults if fault.topics == topics]

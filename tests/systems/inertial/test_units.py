@@ -125,6 +125,14 @@ def test_a_receiver_that_jumps_is_not_taken_for_a_unit() -> None:
     assert not [one for one in found.faults if one.kind == "step"], found.sentence
 
 
+def test_units_that_agree_with_each_other_put_the_reference_in_doubt() -> None:
+    reference = gnss()
+    away = np.rad2deg(drift_of(0.5)[0][:, 0] / 6.371e6)
+    found = judge_units(units(3), replace(reference, latitude_deg=reference.latitude_deg + away))
+    assert found.is_common and not found.off and "the reference, or what they share, is wrong" in found.sentence
+    assert not judge_units(units(3, bad=drift_of(0.5)), gnss()).is_common
+
+
 def test_rate_of_a_unit_is_that_of_its_errors() -> None:
     position, velocity = drift_of(0.05)
     growth = growth_of(np.arange(3600.0), position, velocity, Noise(3.0, 0.02, 300.0, 60.0))
