@@ -233,30 +233,53 @@ def _jumps(time_s: FloatArray, left: FloatArray, least: float, unit: str, *, sum
         return ()
     limit = max(least, TIMES_USUAL * float(np.quantile(known, USUAL)))
     level = np.cumsum(np.nan_to_num(left), axis=0)
+    large = np.nan_to_num(size) > limit
+    usual = NORMAL_95 * _usual_change(level, left, large, sums=sums)
     found: list[Jump] = []
     last = -NEAR
-    for row in np.flatnonzero(np.nan_to_num(size) > limit).tolist():
+    for row in np.flatnonzero(large).tolist():
         if row - last <= NEAR:
             continue
-        before = slice(max(row - NEAR, 0), max(row - ASIDE, 0))
-        after = slice(row + ASIDE, row + NEAR)
-        if not (len(level[before]) and len(level[after])):
+        if not (row > ASIDE and len(level) > row + ASIDE):
             continue
+        before, after = _sides(row)
         seen = np.isfinite(size)
         if not (seen[before].any() and seen[after].any()):
             continue
-        vector = level[after].mean(axis=0) - level[before].mean(axis=0)
-        if not sums:
-            slope = _slope(left, row)
-            vector = vector - slope * (0.5 * (after.start + after.stop) - 0.5 * (before.start + before.stop))
+        vector = _change(level, left, row, sums=sums)
         if np.hypot(*vector) < STAYS * size[row] or float(vector @ left[row]) <= 0.0:
             continue
-        scatter = [float(np.mean(np.var(level[part], axis=0))) for part in (before, after)]
-        half = NORMAL_95 * float(np.sqrt(sum(one / len(level[before]) for one in scatter)))
         last = row
-        jump = Measured(float(np.hypot(*vector)), half)
+        jump = Measured(float(np.hypot(*vector)), usual)
         found.append(Jump(float(time_s[row + 1]), (float(vector[0]), float(vector[1])), jump, unit))
     return tuple(found)
+
+
+def _sides(row: int) -> tuple[slice, slice]:
+    """Return the rows before and after a step whose means are compared."""
+    return slice(max(row - NEAR, 0), max(row - ASIDE, 0)), slice(row + ASIDE, row + NEAR)
+
+
+def _change(level: FloatArray, left: FloatArray, row: int, *, sums: bool) -> FloatArray:
+    """Return by how much the level changes across a row, shape (2,)."""
+    before, after = _sides(row)
+    vector = level[after].mean(axis=0) - level[before].mean(axis=0)
+    if not sums:
+        vector = vector - _slope(left, row) * (0.5 * (after.start + after.stop) - 0.5 * (before.start + before.stop))
+    return np.asarray(vector)
+
+
+def _usual_change(level: FloatArray, left: FloatArray, large: BoolArray, *, sums: bool) -> float:
+    """Return one sigma, per axis, of the change of the level where there is no step.
+
+    It is what the noise of both tracks, their rounding and their slow errors make of the size of a step.
+    """
+    known = np.isfinite(left).all(axis=1) & ~large
+    rows = [row for row in range(NEAR, len(left) - NEAR, NEAR // 2) if known[row - NEAR : row + NEAR].all()]
+    if not rows:  # gaps everywhere: as of a random walk
+        return float(np.sqrt(NEAR * np.nanmean(np.square(left[~large]))))
+    changes = np.array([_change(level, left, row, sums=sums) for row in rows])
+    return float(np.sqrt(np.mean(np.square(changes))))
 
 
 def _slope(left: FloatArray, row: int) -> FloatArray:

@@ -168,7 +168,7 @@ def _of_velocity(time_s: FloatArray, velocity_mps: FloatArray, noise: Noise) -> 
 
 
 def _is_drift(time_s: FloatArray, velocity_mps: FloatArray, rms: float) -> bool:
-    """Tell whether velocity errors are more those of a gyro's drift than those of a tilt at the start.
+    """Tell whether velocity errors look more like a drift than like a tilt at the start.
 
     A tilt, or an error of velocity, makes a wave from the start on; drift makes its velocity grow to one side.
     """

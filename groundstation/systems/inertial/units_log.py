@@ -33,6 +33,8 @@ GNSS = Need("gnss", "GNSS position", POSITION_FIELDS, or_else=VELOCITY_FIELDS, t
 SUREST_M = 30.0  # states of the trajectory with a larger sigma are no reference
 SERIAL_FROM = re.compile(r"^(?P<serial>.*?)\s+from\s+(?P<from_s>\d+(\.\d+)?)(\s*s)?$")
 TRAJECTORY = "the best trajectory"
+# Slow errors of an ordinary receiver: the noise of a class may be that of a better one than the aircraft has.
+ORDINARY_M, ORDINARY_MPS = 3.0, 0.03
 
 
 def unit_topics(flight: Flight) -> tuple[str, ...]:
@@ -184,8 +186,8 @@ def _by_gnss(
         table.values("latitude_deg"),
         table.values("longitude_deg"),
         np.column_stack([table.values(name) for name in VELOCITY_FIELDS]),
-        position_sigma_m=gnss.position_correlated_m,
-        velocity_sigma_mps=gnss.velocity_correlated_mps,
+        position_sigma_m=max(gnss.position_correlated_m, ORDINARY_M),
+        velocity_sigma_mps=max(gnss.velocity_correlated_mps, ORDINARY_MPS),
         position_correlation_s=gnss.position_correlation_s,
         velocity_correlation_s=gnss.velocity_correlation_s,
     )
