@@ -26,6 +26,7 @@ from groundstation.systems.trajectory.estimate import (
 )
 from groundstation.systems.trajectory.fit import Number
 from groundstation.systems.trajectory.inputs import AidReadings, CompassReadings
+from groundstation.systems.trajectory.model import Model
 from groundstation.systems.trajectory.passes import Pass, run_pass
 from groundstation.systems.trajectory.states import HEIGHT, POSITION, VELOCITY, WHEEL
 from groundstation.systems.trajectory.track import smoothed_track
@@ -82,6 +83,7 @@ def aided(
         wrong = {kind: why for kind in readings if (why := _why_not(base, tried, kind, settings))}
         if not wrong:
             done = tried
+            _tell_noise(rows, tried.model)
             break
         for kind, why in wrong.items():
             _leave(rows, kind, why)
@@ -92,6 +94,17 @@ def aided(
 def _leave(rows: dict[str, AidRow], kind: int, why: str, *, is_wrong: bool = True) -> None:
     topic = next(one.topic for one in rows.values() if one.name == NAMES[kind] and one.is_used)
     rows[topic] = replace(rows[topic], is_used=False, reason=why, is_wrong=is_wrong)
+
+
+def _tell_noise(rows: dict[str, AidRow], model: Model) -> None:
+    """Add the noise of the aids that are used."""
+    said: dict[AidName, str] = {
+        "barometer": f"noise {model.baro_m:.2g} m, offset walks by {model.baro_walk_m_rth:.2g} m in an hour",
+        "wheel speed": f"noise {model.wheel_mps:.2g} m/s",
+    }
+    for topic, row in rows.items():
+        if row.is_used and row.name in said:
+            rows[topic] = replace(row, reason="; ".join(filter(None, (row.reason, said[row.name]))))
 
 
 def _tried(base: Estimate, readings: dict[int, AidReadings], *, fit: bool) -> Estimate:
