@@ -37,11 +37,11 @@ from scipy.linalg import rq  # noqa: E402
 from groundstation.base.angles import wrap_180  # noqa: E402
 from groundstation.base.attitude import rotation_n_from_b  # noqa: E402
 from groundstation.base.geodesy import curvature_radii_m  # noqa: E402
+from groundstation.base.units import MPS2_PER_G  # noqa: E402
 from groundstation.simulation.imu.families import Family  # noqa: E402
 from groundstation.simulation.imu.flight import ImuFlight, simulate_imu  # noqa: E402
 from groundstation.simulation.imu.imu_class import ImuClass, load_imu_class  # noqa: E402
 from groundstation.simulation.imu.settings import ImuSettings, ReceiverSettings  # noqa: E402
-from groundstation.simulation.imu.unit import STANDARD_GRAVITY_MPS2  # noqa: E402
 from groundstation.systems.trajectory.forward import run_forward  # noqa: E402
 from groundstation.systems.trajectory.inputs import GnssFixes, ImuIncrements  # noqa: E402
 from groundstation.systems.trajectory.layout import Plan, Samples, fill_gaps, lay_out  # noqa: E402
@@ -159,7 +159,7 @@ def given(family: Family, name: str, rate_hz: float, fixes_hz: float, seed: int,
 
 def _noise_of(of: ImuClass) -> tuple[float, ...]:
     """Densities, sigmas of the biases, their walks (of the same growth as the Gauss-Markov process), scale, turn."""
-    dph, micro_g = np.radians(1.0 / 3600.0), 1e-6 * STANDARD_GRAVITY_MPS2
+    dph, micro_g = np.radians(1.0 / 3600.0), 1e-6 * MPS2_PER_G
     return (
         np.radians(of.angle_random_walk_deg_per_sqrt_h) / 60.0,
         of.velocity_random_walk_mps_per_sqrt_s,
@@ -175,9 +175,9 @@ def _noise_of(of: ImuClass) -> tuple[float, ...]:
 
 
 def judged_at(of: Given) -> Indices:
-    """Return the samples at which errors are judged: once a second in the second half."""
+    """Return the samples at which errors are judged: whole seconds of the second half, where states are given."""
     step = round(of.flight.settings.rate_hz)
-    return np.arange(len(of.flight.time_s) // 2, len(of.flight.time_s), step)
+    return np.arange(1 + len(of.flight.time_s) // 2 // step * step, len(of.flight.time_s), step)
 
 
 def by_pyins(of: Given) -> Side:
@@ -375,7 +375,7 @@ def prepared(of: Given) -> OurPass:
         velocity,
         gnss.is_precise,
     )
-    micro_g_of = 1e3 / STANDARD_GRAVITY_MPS2
+    micro_g_of = 1e3 / MPS2_PER_G
     model = Model(
         gyro_noise_deg_rth=float(np.degrees(of.gyro_noise) * 60.0),
         accel_noise_mps_rth=of.accelerometer_noise * 60.0,

@@ -9,6 +9,7 @@ Source: G. J. Bierman, Fixed interval smoothing with discrete measurements, Int.
 from groundstation.base.compile import in_place
 from groundstation.methods.kalman.arrays import Pattern
 from groundstation.systems.trajectory.states import (
+    ATT,
     KEPT_ROWS,
     LEV,
     NAVIGATION,
@@ -135,8 +136,8 @@ def run_backward(
         Room.
     x, variance : ndarrays, shapes (e, KEPT_ROWS), (e, KEPT_ROWS)
         Filled: smoothed correction to the estimate before the measurements of each epoch, and its variance.
-    plane : ndarray, shape (e,)
-        Filled: covariance of the smoothed position, north with east.
+    plane : ndarray, shape (e, 2)
+        Filled: covariances of north with east: of the smoothed position, and of the smoothed attitude.
     first_x : ndarray, shape (n,)
         Filled: p a at the start with the covariance ``first_p`` of the start, negative: correction of the start.
     """
@@ -162,10 +163,11 @@ def run_backward(
                         u[j] += value * A[r, j]
             for j in range(STATES):
                 spread += solved.p[e, i, j] * u[j]
-                beside += solved.p[e, 0, j] * u[j]
             variance[e, i] = solved.p[e, i, i] - spread
-            if i == 1:
-                plane[e] = solved.p[e, 0, 1] - beside
+            if i in (1, ATT + 1):
+                for j in range(STATES):
+                    beside += solved.p[e, i - 1, j] * u[j]
+                plane[e, 0 if i == 1 else 1] = solved.p[e, i - 1, i] - beside
         back_over_step(e, pattern, linear, a, A, w, u)
     for i in range(STATES):
         total = 0.0

@@ -26,6 +26,7 @@ from groundstation.methods.kalman.kernels import (
 from groundstation.systems.trajectory.observe import NO_ROW, observe
 from groundstation.systems.trajectory.states import (
     AIDS,
+    ATT,
     BA,
     BARO,
     BG,
@@ -286,11 +287,13 @@ def run_forward(
                 for i in range(KEPT_ROWS):
                     for j in range(STATES):
                         solved.p[e, i, j] = now.p[i, j]
+                solved.tilt[e, 0] = now.p[ATT, ATT + 1]
                 for j in range(STATES):
                     solved.before[e, j] = room.x[0, j]
             for m in range(schedule.seen[e], schedule.seen[e + 1]):
                 likelihood += update(m, seen, gate, held, now, room, linear, solved)
             if keeps:
+                solved.tilt[e, 1] = now.p[ATT, ATT + 1]
                 for j in range(STATES):
                     solved.after[e, j] = room.x[0, j]
                     solved.variance[e, j] = now.p[j, j]

@@ -141,7 +141,7 @@ def _row(full: Pass, done: Pass, start_s: float, end_s: float) -> tuple[float, .
     size = np.hypot(error[:, 0], error[:, 1])
     worst = int(np.argmax(size))
     at, (n, e) = inside[worst], error[worst, :2]
-    a, b, c = done.variance[at, 0], done.variance[at, 1], done.plane[at]
+    a, b, c = done.variance[at, 0], done.variance[at, 1], done.plane[at, 0]
     squared = (b * n * n - 2.0 * c * n * e + a * e * e) / max(a * b - c * c, 1e-12)
     down = np.abs(error[:, 2])
     lowest = int(np.argmax(down))

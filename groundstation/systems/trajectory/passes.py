@@ -75,7 +75,17 @@ def nothing_kept() -> Solved:
     """Return a history of no length."""
     wide = np.zeros((0, STATES))
     none = np.zeros(0)
-    return Solved(np.zeros((0, KEPT_ROWS, STATES)), wide, wide, wide, wide, none, none, np.zeros(0, dtype=np.int8))
+    return Solved(
+        np.zeros((0, KEPT_ROWS, STATES)),
+        wide,
+        wide,
+        wide,
+        np.zeros((0, 2)),
+        wide,
+        none,
+        none,
+        np.zeros(0, dtype=np.int8),
+    )
 
 
 def all_kept(plan: Plan) -> Solved:
@@ -86,6 +96,7 @@ def all_kept(plan: Plan) -> Solved:
         np.empty((epochs, STATES)),
         np.empty((epochs, STATES)),
         np.empty((epochs, STATES)),
+        np.empty((epochs, 2)),
         np.empty((scalars, STATES)),
         np.empty(scalars),
         np.ones(scalars),
@@ -122,8 +133,8 @@ class Pass:
         Linearisation and history of the filter.
     x, variance : ndarrays, shape (e, KEPT_ROWS)
         Smoothed correction to the estimate before the measurements of each epoch, and its variance.
-    plane : ndarray, shape (e,)
-        Covariance of the smoothed position, north with east.
+    plane : ndarray, shape (e, 2)
+        Covariances of north with east: of the smoothed position, and of the smoothed attitude.
     before_variance : ndarray, shape (e, NAVIGATION)
         Variance of the filter before the measurements of each epoch.
     constants, constants_variance : ndarrays, shape (STATES,)
@@ -213,7 +224,7 @@ def run_pass(
     now, room = start.now(), make_room(start.prior)
     likelihood = filter_epochs(samples, plan, noise, gate, line, (0, epochs), now, room, linear, solved, known is None)
     x, variance = np.zeros((epochs, KEPT_ROWS)), np.zeros((epochs, KEPT_ROWS))
-    plane = np.zeros(epochs)
+    plane = np.zeros((epochs, 2))
     first, square = np.zeros(STATES), [np.zeros((STATES, STATES)) for _ in range(2)]
     run_backward(
         plan.schedule,

@@ -174,6 +174,7 @@ class Solved(NamedTuple):
     before: FloatArray  # (e, STATES) correction before the measurements of each epoch
     after: FloatArray  # (e, STATES) and after them
     variance: FloatArray  # (e, STATES) after the measurements
+    tilt: FloatArray  # (e, 2) covariance of the attitude, north with east, before and after them
     K: FloatArray  # (s, STATES)
     y: FloatArray  # (s,) innovation of the correction
     S: FloatArray  # (s,)

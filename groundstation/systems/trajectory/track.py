@@ -29,7 +29,8 @@ def smoothed_track(samples: Samples, one: Pass, at: Int64Array | None = None, *,
     correction = begins[epoch - 1] * (1.0 - share) + ends[epoch] * share
     variance = np.maximum(one.variance, 0.0)
     spread = variance[epoch - 1] * (1.0 - share) + variance[epoch] * share
-    return _states(samples, one, at, correction, spread[:, :NAVIGATION], segment)
+    tilt = one.plane[epoch - 1, 1:] * (1.0 - share) + one.plane[epoch, 1:] * share
+    return _states(samples, one, at, correction, spread[:, :NAVIGATION], tilt[:, 0], segment)
 
 
 def forward_track(samples: Samples, one: Pass, at: Int64Array | None = None, *, segment: int = 0) -> TrackOfStates:
@@ -41,7 +42,8 @@ def forward_track(samples: Samples, one: Pass, at: Int64Array | None = None, *, 
     spread = after[epoch - 1] * (1.0 - share) + before[epoch] * share
     begins = (one.solved.after - one.linear.closed)[:, :NAVIGATION]
     correction = begins[epoch - 1] * (1.0 - share) + one.solved.before[epoch, :NAVIGATION] * share
-    return _states(samples, one, at, correction, spread, segment)
+    tilt = one.solved.tilt[epoch - 1, 1:] * (1.0 - share) + one.solved.tilt[epoch, :1] * share
+    return _states(samples, one, at, correction, spread, tilt[:, 0], segment)
 
 
 def _place(samples: Samples, one: Pass, at: Int64Array) -> tuple[Int64Array, FloatArray]:
@@ -52,7 +54,13 @@ def _place(samples: Samples, one: Pass, at: Int64Array) -> tuple[Int64Array, Flo
 
 
 def _states(
-    samples: Samples, one: Pass, at: Int64Array, correction: FloatArray, variance: FloatArray, segment: int
+    samples: Samples,
+    one: Pass,
+    at: Int64Array,
+    correction: FloatArray,
+    variance: FloatArray,
+    tilt: FloatArray,
+    segment: int,
 ) -> TrackOfStates:
     nav = one.linear.nav[one.plan.schedule.slot[at]]
     north, east = curvature_radii_m(np.degrees(nav[:, 0]))
@@ -72,7 +80,7 @@ def _states(
         wrap_360(np.degrees(heading)),
         sigma[:, :3],
         sigma[:, VEL:ATT],
-        _attitude_sigma(pitch, heading, variance[:, ATT:NAVIGATION]) / DEG,
+        _attitude_sigma(pitch, heading, variance[:, ATT:NAVIGATION], tilt) / DEG,
     )
 
 
@@ -85,13 +93,17 @@ def angles_of(quaternion: FloatArray) -> tuple[FloatArray, FloatArray, FloatArra
     return roll, pitch, heading
 
 
-def _attitude_sigma(pitch: FloatArray, heading: FloatArray, variance: FloatArray) -> FloatArray:
+def _attitude_sigma(
+    pitch: FloatArray, heading: FloatArray, variance: FloatArray, north_with_east: FloatArray
+) -> FloatArray:
     """Return sigmas of roll, pitch and heading from those of the rotation vector in n.
 
-    Its parts are taken as uncorrelated.
+    Its vertical part is taken as uncorrelated with the others.
     """
     c, s = np.cos(heading) ** 2, np.sin(heading) ** 2
-    along, across = c * variance[:, 0] + s * variance[:, 1], s * variance[:, 0] + c * variance[:, 1]
+    both = np.sin(2.0 * heading) * north_with_east
+    along = np.maximum(c * variance[:, 0] + s * variance[:, 1] + both, 0.0)
+    across = np.maximum(s * variance[:, 0] + c * variance[:, 1] - both, 0.0)
     level = np.maximum(np.cos(pitch), LEAST_LEVEL)
     roll = along / level**2
     return np.asarray(np.sqrt(np.stack([roll, across, variance[:, 2] + np.tan(np.arccos(level)) ** 2 * along], axis=1)))

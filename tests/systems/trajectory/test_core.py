@@ -14,6 +14,7 @@ from groundstation.simulation.imu.settings import ImuSettings
 from groundstation.systems.trajectory.model import DEG, Model, StartSigmas, gate
 from groundstation.systems.trajectory.passes import Pass, Start, run_pass
 from groundstation.systems.trajectory.states import (
+    ATT,
     BA,
     BARO,
     BG,
@@ -27,6 +28,7 @@ from groundstation.systems.trajectory.states import (
     NAVIGATION,
     NO_RATE,
     NO_SLIP,
+    POS,
     POSITION,
     SLOW,
     STATES,
@@ -36,6 +38,7 @@ from groundstation.systems.trajectory.states import (
     WHL,
     Seen,
 )
+from groundstation.systems.trajectory.track import _attitude_sigma
 from tests.systems.trajectory.core_cases import (
     NOISE,
     SIZES,
@@ -229,8 +232,8 @@ def dense(family: Family, epochs: int) -> tuple[Pass, FloatArray, FloatArray, Fl
     scale = 1.0 / np.sqrt(np.diag(S))
     gain = (np.linalg.solve(S * scale[:, None] * scale, (big @ joint) * scale[:, None]) * scale[:, None]).T
     smoothed = mean + gain @ (linear.z[at] - big @ mean)
-    variance = np.diag(joint) - np.einsum("ij,ij->i", gain, (big @ joint).T)
-    return done, xs, ps, smoothed.reshape(epochs, n), variance.reshape(epochs, n)
+    spread = (joint - gain @ (big @ joint)).reshape(epochs, n, epochs, n)
+    return done, xs, ps, smoothed.reshape(epochs, n), np.stack([spread[e, :, e] for e in range(epochs)])
 
 
 @pytest.mark.parametrize(("family", "epochs"), [("uav", 24), ("hover", 40)])
@@ -240,13 +243,29 @@ def test_filter_is_the_dense_filter(family: Family, epochs: int) -> None:
     assert np.abs((done.solved.before - xs) / sigma).max() < 1e-8
     off = (done.solved.p - ps[:, :KEPT_ROWS]) / (sigma[:, :KEPT_ROWS, None] * sigma[:, None, :])
     assert np.abs(off).max() < 1e-8
+    assert np.array_equal(done.solved.tilt[:, 0], done.solved.p[:, ATT, ATT + 1])
+    assert (np.abs(done.solved.tilt[1:, 1]) > 0.0).all()
+
+
+def test_sigmas_of_roll_and_pitch_are_those_along_the_vehicle() -> None:
+    heading = np.radians([0.0, 30.0, 90.0, 200.0])
+    roll, pitch = np.radians(0.3), np.radians(0.1)
+    c, s = np.cos(heading), np.sin(heading)
+    variance = np.stack(
+        [(c * roll) ** 2 + (s * pitch) ** 2, (s * roll) ** 2 + (c * pitch) ** 2, 0.01 + 0.0 * c], axis=1
+    )
+    found = _attitude_sigma(np.zeros(4), heading, variance, c * s * (roll**2 - pitch**2))
+    assert np.allclose(found, np.tile([roll, pitch, 0.1], (4, 1)), rtol=1e-12)
 
 
 @pytest.mark.parametrize(("family", "epochs"), [("uav", 24), ("hover", 40)])
 def test_smoother_is_least_squares_of_all_data(family: Family, epochs: int) -> None:
-    done, _xs, _ps, smoothed, variance = dense(family, epochs)
-    wanted = variance[:, :KEPT_ROWS]
+    done, _xs, _ps, smoothed, spread = dense(family, epochs)
+    wanted = np.einsum("eii->ei", spread)[:, :KEPT_ROWS]
     assert np.abs(done.variance / wanted - 1.0).max() < 1e-8
+    for at, first in enumerate((POS, ATT)):
+        off = done.plane[:, at] - spread[:, first, first + 1]
+        assert np.abs(off / np.sqrt(wanted[:, first] * wanted[:, first + 1])).max() < 1e-8
     assert np.abs((done.x - smoothed[:, :KEPT_ROWS]) / np.sqrt(wanted)).max() < 1e-8
     filtered = np.einsum("eii->ei", done.solved.p[:, :, :KEPT_ROWS])
     assert (done.variance[:-1] < 0.999 * filtered[:-1]).any(axis=1).all()  # it does know more than the filter
