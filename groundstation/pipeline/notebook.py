@@ -30,6 +30,7 @@ from groundstation.systems.inertial.answer import InertialResult
 from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.systems.latency.answer import Latencies
 from groundstation.systems.magnetic.answer import MagneticResult
+from groundstation.systems.magnetic.flux_answer import FluxDeviation
 from groundstation.systems.magnetic.ground_answer import GroundDeviation
 from groundstation.systems.trajectory.answer import BestTrajectory
 from groundstation.tables.table import Flight, Table, Tables, TimedTable, timed
@@ -145,6 +146,13 @@ class OpenFlight(ABC):
         Raises as :meth:`heading`.
         """
         return self.answer(GroundDeviation)
+
+    def magnetic_flux(self) -> FluxDeviation:
+        """Return the deviation of a compass that gives heading alone, in flight.
+
+        Raises as :meth:`heading`.
+        """
+        return self.answer(FluxDeviation)
 
     def trajectory(self) -> BestTrajectory:
         """Return the best trajectory: state, accuracy, checks, errors of the on-board filter.

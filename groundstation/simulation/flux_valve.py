@@ -3,9 +3,12 @@
 The valve hangs, so that it leans with the aircraft in a turn; its reading is displayed with a lag, or corrects a gyro.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from groundstation.base.angles import FloatArray, unwrap, wrap_180, wrap_360
@@ -168,7 +171,7 @@ def simulate_flux_flight(settings: FluxFlightSettings, seed: int) -> FluxFlight:
         "ins": _table("ins", start_ns, ins),
         "gnss": _table("gnss", start_ns, gnss),
         "air": _table("air", start_ns, {"true_airspeed_mps": quantised(logged, VELOCITY_STEP_MPS)}),
-        "discrete": _table("discrete", start_ns, {"weight_on_wheels": (~airborne).astype(np.float64)}),
+        "discrete": _table("discrete", start_ns, {"weight_on_wheels": ~airborne}),
     }
     metadata = {"aircraft": "SIM-F", "flight": str(seed), "start_utc": settings.start_utc}
     return FluxFlight(Flight(tables, metadata, start_ns, True, "flux.csv"), coefficients, wrap_360(heading))
@@ -254,8 +257,8 @@ def _wandering(rng: np.random.Generator, count: int, time_s: float) -> FloatArra
     return np.asarray(lfilter([1.0], [1.0, -keep], white))
 
 
-def _table(topic: str, start_ns: int, columns: dict[str, FloatArray]) -> Table:
+def _table(topic: str, start_ns: int, columns: Mapping[str, NDArray[Any]]) -> Table:
     count = len(next(iter(columns.values())))
-    time_ns = start_ns + np.arange(count, dtype=np.int64) * NS_PER_S
+    device_ns = np.arange(count, dtype=np.int64) * NS_PER_S
     made = {name: Column(values) for name, values in columns.items()}
-    return Table(topic, time_ns, made, np.arange(count), Column(time_ns))
+    return Table(topic, start_ns + device_ns, made, np.arange(count), Column(device_ns))

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from groundstation.base.errors import NotAssessableError
+from groundstation.base.signals import topics_of_kind
 from groundstation.methods.roles import InsKinds
 from groundstation.results.roles import Delays
 from groundstation.systems.analysis import Shortfall
@@ -9,7 +11,7 @@ from groundstation.systems.known import Known
 from groundstation.systems.magnetic.earth import earth_field
 from groundstation.systems.magnetic.flown import FlownTurns, find_flown
 from groundstation.systems.magnetic.held_out import find_unseen, is_level
-from groundstation.systems.magnetic.readings import choose_topics
+from groundstation.systems.magnetic.readings import ANALYSIS, choose_topics
 from groundstation.systems.magnetic.settings import MagneticSettings
 from groundstation.tables.table import Flight
 
@@ -24,7 +26,7 @@ def examine_magnetic(flight: Flight, known: Known, settings: MagneticSettings) -
     NotAssessableError
         Where nothing can be estimated, with the reason that the estimate would give.
     """
-    topics = choose_topics(flight)
+    topics = _topics(flight)
     flown = find_flown(flight, topics, known.phases, _kinds(flight, known), known.answer_meeting(Delays), settings)
     rows = np.sort(np.concatenate([one.rows(right) for one in flown.figures for right in (True, False)]))
     earth_field(flight, flown.readings, rows, settings)
@@ -37,6 +39,17 @@ def examine_magnetic(flight: Flight, known: Known, settings: MagneticSettings) -
     if level < settings.held_out_samples_min:
         found.append(Shortfall(f"no level flight beside the figure to judge by ({level} readings)"))
     return tuple(found)
+
+
+def _topics(flight: Flight) -> tuple[str, str]:
+    """Return INS and magnetometer; of a log with heading alone say what serves it."""
+    try:
+        return choose_topics(flight)
+    except NotAssessableError as error:
+        if not any(flight[topic].has("magnetic_heading_deg") for topic in topics_of_kind("ins", flight.topics())):
+            raise
+        text = f"{error.found}; a magnetic heading alone is judged by magnetic_flux and magnetic_ground"
+        raise NotAssessableError(ANALYSIS, text, error.expected, error.next_step) from error
 
 
 def _kinds(flight: Flight, known: Known) -> dict[str, str]:

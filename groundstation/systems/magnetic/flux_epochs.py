@@ -29,7 +29,7 @@ BREAK_S = 5.0  # a longer step between epochs ends a leg
 TURNING_DPS = 0.5
 GRAVITY_MPS2 = 9.81
 DERIVED_SD_DEG = 0.03  # magnetic heading that follows the true one so closely is computed from it
-LEAST_EPOCHS = 60
+LEAST_EPOCHS, MOST_EPOCHS = 60, 20_000
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,8 @@ def _thinned(table: Table) -> Table:
     steps_ns = np.diff(table.time_ns)
     if not steps_ns.size:
         return table
-    step = int(STEP_S * NS_PER_S / max(float(np.median(steps_ns)), 1.0) + 0.5)
+    wanted_s = max(STEP_S, float(table.time_ns[-1] - table.time_ns[0]) / NS_PER_S / MOST_EPOCHS)
+    step = int(wanted_s * NS_PER_S / max(float(np.median(steps_ns)), 1.0) + 0.5)
     return table.take(slice(0, None, step)) if step > 1 else table
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180
 from groundstation.base.units import DEG_PER_RAD
@@ -22,7 +23,10 @@ LEAST_DIRECTIONS = 6  # for legs to be predicted by others
 
 @dataclass(frozen=True)
 class LegValues:
-    """Legs with a true heading; arrays of shape (m,), ``common`` (m, m)."""
+    """Legs with a true heading; arrays of shape (m,), ``common`` (m, m).
+
+    Legs of one ``group`` follow each other on one heading: what is their own they have together.
+    """
 
     rows: list[Rows]
     heading_deg: FloatArray
@@ -31,6 +35,7 @@ class LegValues:
     noise_deg: FloatArray
     own_deg: FloatArray
     common: FloatArray
+    group: NDArray[np.intp]
 
 
 def leg_values(
@@ -56,9 +61,11 @@ def leg_values(
         [np.hypot(_noise_deg(epochs.time_s[one:other], error_deg[one:other]), rounding) for one, other in rows]
     )
     leaning = np.array([_by_acceleration(epochs, first, last) for first, last in rows])
-    own = np.sqrt(noise**2 + known.own_sigma_deg**2 + leaning**2) if rows else noise
-    common = known.leg_covariance[np.ix_(chosen, chosen)]
-    return LegValues(rows, heading, true, wrap_180(heading + declination - true), noise, own, common)
+    own = np.sqrt(noise**2 + leaning**2) if rows else noise
+    group = _groups(heading, settings)
+    together = known.own_sigma_deg**2 * (group[:, None] == group)
+    common = known.leg_covariance[np.ix_(chosen, chosen)] + together
+    return LegValues(rows, heading, true, wrap_180(heading + declination - true), noise, own, common, group)
 
 
 def fit_legs(values: LegValues, cells: tuple[LagCell, ...], settings: MagneticFluxSettings) -> CurveFit:
@@ -120,6 +127,7 @@ def _fit(values: LegValues, cell: LagCell, settings: MagneticFluxSettings) -> Cu
         settings,
         columns=columns,
         common=values.common,
+        group=values.group,
     )
 
 
@@ -132,7 +140,16 @@ def _some(values: LegValues, kept: np.ndarray) -> LegValues:
         values.noise_deg[kept],
         values.own_deg[kept],
         values.common[np.ix_(kept, kept)],
+        values.group[kept],
     )
+
+
+def _groups(heading_deg: FloatArray, settings: MagneticFluxSettings) -> NDArray[np.intp]:
+    """Return the number of the group of every leg: a new one where the direction is another."""
+    if not len(heading_deg):
+        return np.zeros(0, dtype=np.intp)
+    turned = np.abs(wrap_180(np.diff(heading_deg))) > settings.repeat_within_deg
+    return np.concatenate([[0], np.cumsum(turned)]).astype(np.intp)
 
 
 def _is_straight(epochs: FluxEpochs, leg: Rows, settings: MagneticFluxSettings) -> bool:

@@ -51,8 +51,9 @@ def flux_remarks(answer: FluxDeviation, is_levelled: bool, settings: MagneticFlu
 def _use(bank: BankError, settings: MagneticFluxSettings) -> str:
     """Return what the turns say of the limits of use."""
     if bank.state != "found" or bank.lean is None or bank.lag_s is None:
+        text = f"bank error and slaving are not observable ({bank.reason})"
         return (
-            f"bank error and slaving are not observable ({bank.reason}): the heading in and after a turn is not judged"
+            f"{text}: the heading in and after a turn is not judged, and a gyro slaved over minutes would bias A to E"
         )
     limit = f"{settings.use_error_max_deg:g} deg"
     if bank.lag95_s is not None and bank.lag95_s[0] >= LAGGING_S:

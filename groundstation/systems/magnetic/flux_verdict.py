@@ -18,7 +18,7 @@ def flux_gates(values: Mapping[str, float | None], settings: MagneticFluxSetting
         "curve": ("sigma of the curve without A, rms over the circle", "deg", ""),
         "level": ("sigma of A: declination and reference in it", "deg", ""),
         "left": (
-            "rms error of legs after correction by what they were not in",
+            "rms error left on legs that the fit did not have",
             "deg",
             "fewer than six directions",
         ),

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180, wrap_360
 from groundstation.base.words import listed
@@ -47,6 +48,7 @@ def fit_curve(
     *,
     columns: FloatArray | None = None,
     common: FloatArray | None = None,
+    group: NDArray[np.intp] | None = None,
 ) -> CurveFit:
     """Posterior of A to E, with what a run has of its own integrated out.
 
@@ -62,19 +64,22 @@ def fit_curve(
         In place of those of the headings: of a display that lags.
     common : ndarray, shape (n, n), optional
         Covariance of the errors besides: of the wind they rest on.
+    group : ndarray of int, shape (n,), optional
+        Runs of one number have their own error together: pieces of one leg.
 
     Source: A. Gelman et al., Bayesian Data Analysis, third edition, 2013, sections 5.4 and 14.2.
     """
     columns = harmonics.design(heading_deg) if columns is None else columns
     prior = np.diag(_prior_sigma(settings) ** 2)
     shared = np.zeros((len(error_deg), len(error_deg))) if common is None else common
+    together = np.eye(len(error_deg)) if group is None else (group[:, None] == group).astype(np.float64)
     scale = settings.place_sigma_deg
     own = np.linspace(0.0, PLACE_REACH * scale, PLACE_STEPS + 1)
     middle = mean_heading(error_deg)
     left = wrap_180(error_deg - middle)
     log_weight, means, covariances = np.empty(len(own)), [], []
     for place, spread in enumerate(own):
-        noise = np.diag(sigma_deg**2 + spread**2) + shared
+        noise = np.diag(sigma_deg**2) + spread**2 * together + shared
         expected = columns @ prior @ columns.T + noise
         gain = np.linalg.solve(expected, columns @ prior).T
         _sign, log_determinant = np.linalg.slogdet(expected)

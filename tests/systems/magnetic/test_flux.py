@@ -209,6 +209,14 @@ def test_four_headings_show_a_b_and_c() -> None:
     assert answer.residual_rms_deg is None
 
 
+def test_pieces_of_one_leg_are_not_several() -> None:
+    """What a leg has of its own its pieces have together: a leg ten times as long tells hardly more of B."""
+    short, long = found(), found(leg_s=1200.0)
+    assert len(long.used) > 8 * len(short.used)
+    assert long.coefficient("B").sigma_deg > 0.6 * short.coefficient("B").sigma_deg
+    assert expect_truth(long, flown(leg_s=1200.0).coefficients_deg) == len(LETTERS)
+
+
 def test_an_error_of_the_declination_goes_into_a_one_to_one() -> None:
     flight = flown().flight
     one, other = (

@@ -1,7 +1,7 @@
 """Monte Carlo study of a flux valve in flight: coverage of A to E, cell by cell."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +24,7 @@ CELLS: Mapping[str, FluxFlightSettings] = {
     "four legs": FluxFlightSettings(with_ins=False, headings_deg=FOUR),
     "two legs": FluxFlightSettings(with_ins=False, headings_deg=TWO),
     "slaved": FluxFlightSettings(slaved_s=60.0),
+    "slaved, wind solved": FluxFlightSettings(slaved_s=60.0, with_ins=False),
     "opposite turns": FluxFlightSettings(lean=0.0, headings_deg=TWO, full_turns=2),
     "steps of 1 deg": FluxFlightSettings(with_ins=False, step_deg=1.0),
     "wind changes": FluxFlightSettings(with_ins=False, wind_wander_mps=2.0),
@@ -50,9 +51,9 @@ class FluxRun:
 def fly_and_judge(cell: str, seed: int) -> FluxRun:
     """Fly one flight of a cell and judge what is found."""
     settings = CELLS[cell]
-    if cell == "slaved":
+    if settings.slaved_s > 0.0:
         slaved_s = float(generator(seed, "flux slaving").uniform(*SLAVED_S))
-        settings = FluxFlightSettings(slaved_s=slaved_s)
+        settings = replace(settings, slaved_s=slaved_s)
     flown = simulate_flux_flight(settings, seed)
     try:
         found = estimate_flux_deviation(flown.flight)
