@@ -8,6 +8,7 @@ from groundstation.tables.estimator_in_use import estimator_in_use
 from groundstation.tables.table import Flight
 
 _ESTIMATORS = re.compile(r"\b(EKF[123]|DCM)\b")
+_NOT_TOLD = "DCM or a filter that is not logged"
 _SECOND = "AHR2, the autopilot's second estimate"
 
 
@@ -26,7 +27,7 @@ class FilterOfTopic:
 def filter_of_ins(flight: Flight, topic: str) -> FilterOfTopic:
     """Return the filter of an INS topic, and whether it flew the aircraft."""
     told = " ".join(text for key, text in sorted(flight.metadata.items()) if key.startswith(f"derived.{topic}."))
-    names = _ESTIMATORS.findall(told)
+    names = _ESTIMATORS.findall(told.replace(_NOT_TOLD, ""))
     in_use = estimator_in_use(flight)
     name = names[-1] if names else "" if in_use is None or in_use.others else in_use.name
     if _SECOND in told and not names:

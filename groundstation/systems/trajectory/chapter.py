@@ -173,7 +173,7 @@ def _onboard(answer: BestTrajectory) -> Grid | None:
         flew = "It flew the vehicle" if answer.onboard.flew else "It did not fly the vehicle"
         caption += f" {flew} ({typeset(answer.onboard.flew_source)})."
     known = next((one.axes_sigma for one in answer.onboard.rows if one.axes_sigma is not None), None)
-    if known is not None and any(one.changes or one.spans for one in answer.onboard.rows):
+    if is_sure and known is not None and any(one.changes or one.spans for one in answer.onboard.rows):
         caption += (
             " Where a constant changes, the part is right that agrees with the axes of the filter, which its turning "
             "shows."

@@ -318,6 +318,12 @@ def test_the_filter_that_flew_comes_first_and_is_named() -> None:
     ]
 
 
+def test_a_filter_that_the_log_leaves_open_has_no_name() -> None:
+    told = {"derived.ins.true_heading_deg": "yaw of ATT (DCM or a filter that is not logged) with compass"}
+    (found,) = filters_of(Flight(dict(onboard(TRACK).tables), told))
+    assert (found.name, found.flew) == ("", None)
+
+
 def test_lanes_of_an_autopilot_are_compared() -> None:
     true = onboard(TRACK)
     lanes = [ardupilot_lane(onboard(TRACK, heading_error_deg=error), lane) for lane, error in enumerate((0.0, 1.0))]
