@@ -65,7 +65,7 @@ def _claim(answer: UnitsResult) -> Claim:
         CLAIMS[answer.verdict],
         _headline(answer),
         ", ".join(answer.off),
-        "off" if answer.verdict == "off" else "one is off",
+        f"of {len(answer.units)} INS",
         (f"{typeset(answer.sentence)}.",),
     )
 
@@ -93,7 +93,7 @@ def _table(answer: UnitsResult) -> Grid:
     caption = (
         f"{against}± is half of the 95 % interval of the measurement, left out where it rounds to nothing. "
         "A rate marked * is the growth inside the log: nothing shows when navigation began. Heading: less that of the "
-        "trajectory. Clock: later (+) than the unit by which clocks are set, taken off."
+        "trajectory. Clock: later (+) than the unit by which clocks are set; more than 0.05 s is taken off."
     )
     return _grid("Units", UNIT_COLUMNS, answer.units, caption)
 
