@@ -8,7 +8,7 @@ import pytest
 from groundstation.base.records import Item, RecordBatch
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
-from groundstation.readers import flysight2, registry
+from groundstation.readers import flysight2, flysight2_log, registry
 from groundstation.readers.source import Source
 from tests.readers.test_contract import check
 from tests.readers.test_flat_csv import Read
@@ -122,7 +122,7 @@ def test_pieces_of_a_file_read_as_the_whole(tmp_path: Path, monkeypatch: pytest.
     path = tmp_path / "x.csv"
     path.write_text(TOP + FIXES + SENSORS + "$DATA\n" + FIX.format(0.2) + ROWS)
     whole, parts = items_of(path), list[list[Item]]()
-    monkeypatch.setattr(flysight2, "LINES", 7)
+    monkeypatch.setattr(flysight2_log, "LINES", 7)
     parts.append(items_of(path))
     for items in (whole, *parts):
         check(items)

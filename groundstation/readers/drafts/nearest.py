@@ -14,6 +14,7 @@ from groundstation.readers.source import Source
 FEWEST_SHARED, LEAST_SHARE = 4, 0.5  # columns, one fewer of others' profiles, and their share of those of the profile
 MOST_NAMED = 8
 _FEWEST_ROWS = 3  # and columns, of a table without names
+_FEWEST_OF_NUMBERS = 2  # of its columns: lines of a text count themselves
 _MOST_SEARCHED = 500  # names among which a similar one is looked for
 
 
@@ -59,9 +60,10 @@ def advice_on(source: Source, profiles: Iterable[Profile], page: str) -> Advice 
 
 
 def _without_names(sample: TableSample, draft: str) -> Advice | None:
-    """Return advice on a table without a row of names; None where its rows are few."""
+    """Return advice on a table without a row of names; None where its rows are few, or words of a text."""
     rows, count = sum(map(len, sample.blocks)), len(sample.names)
-    if rows < _FEWEST_ROWS or count < _FEWEST_ROWS:
+    of_numbers = sum(map(sample.is_of_numbers, range(count)))
+    if rows < _FEWEST_ROWS or count < _FEWEST_ROWS or of_numbers < _FEWEST_OF_NUMBERS:
         return None
     parted = "blanks" if sample.is_spaced else f"{sample.delimiter!r}"
     found = f"a table without a row of names ({count} columns parted by {parted}, the first row: "
