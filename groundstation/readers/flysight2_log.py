@@ -81,7 +81,7 @@ class _Log:
 
 
 def items_of(source: Source, name: str) -> Iterator[Item]:
-    """Yield the header under the reader's name, fixes, pressures, other records, remarks and damage."""
+    """Yield the header, fixes, pressures, other records, remarks and damage."""
     log = _Log()
     for line in source.head[:LOOKED_AT].decode("utf-8", errors="replace").split("$DATA")[0].splitlines():
         log.take(line)

@@ -60,7 +60,10 @@ def advice_on(source: Source, profiles: Iterable[Profile], page: str) -> Advice 
 
 
 def _without_names(sample: TableSample, draft: str) -> Advice | None:
-    """Return advice on a table without a row of names; None where its rows are few, or words of a text."""
+    """Return advice on a table without a row of names.
+
+    None where its rows are few, or lines of a text.
+    """
     rows, count = sum(map(len, sample.blocks)), len(sample.names)
     of_numbers = sum(map(sample.is_of_numbers, range(count)))
     if rows < _FEWEST_ROWS or count < _FEWEST_ROWS or of_numbers < _FEWEST_OF_NUMBERS:
