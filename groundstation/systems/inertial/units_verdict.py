@@ -97,7 +97,7 @@ def growth_faults(
 
 
 def is_common(by_reference: Mapping[str, Judged], pairs: Sequence[Judged]) -> bool:
-    """Tell whether all units are off the reference and agree with each other.
+    """Tell whether all units are off by the reference and agree with each other.
 
     Then the reference is wrong, or what the units share: the place or the levelling of their alignment.
     """
