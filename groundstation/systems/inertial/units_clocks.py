@@ -16,6 +16,7 @@ MOST_LATE_S = 600.0
 LEAST_MOTION_MPS = 0.5  # RMS about the running mean, for a clock to show
 LEAST_CORRELATION = 0.5
 LEAST_LATE_S = 0.05  # 10 m at 200 m/s; less is not taken off
+LEAST_HALF_S = 0.002  # interpolation between the rows
 TIMES_HALF = 1.5  # of its interval, for a delay to be taken off
 STEPS = 4
 ROBUST = 5.0
@@ -124,7 +125,8 @@ def _refined(
             return None
         solved, half = found
         late_s, more_s = late_s + float(solved[0]), more_s + float(solved[1])
-    return ClockFit(Measured(late_s, float(half[0])), Measured(more_s, float(half[1])))
+    late_half, more_half = (float(np.hypot(one, LEAST_HALF_S)) for one in half[:2])
+    return ClockFit(Measured(late_s, late_half), Measured(more_s, more_half))
 
 
 def _least_squares(design: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray] | None:

@@ -97,7 +97,7 @@ def growth_of(
     if has_place.sum() >= FEWEST:
         placed = position[has_place]
         placed = placed - placed[0] if from_first else placed
-        found |= _of_position(time_s[has_place], placed, noise, reset_s)
+        found |= _of_position(time_s[has_place], placed, noise, reset_s, from_first=from_first)
     if has_speed.sum() >= FEWEST:
         found |= _of_velocity(time_s[has_speed], velocity[has_speed], noise)
     if not found:
@@ -125,18 +125,21 @@ def means_of(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatA
 
 
 def _of_position(
-    time_s: FloatArray, position_m: FloatArray, noise: Noise, reset_s: tuple[float, ...]
+    time_s: FloatArray, position_m: FloatArray, noise: Noise, reset_s: tuple[float, ...], *, from_first: bool
 ) -> dict[str, object]:
+    """Return rate and largest value; counted from the first one, its error is in all."""
     began_s = np.concatenate([[0.0], np.sort(reset_s)])
     since_s = time_s - began_s[np.searchsorted(began_s, time_s, side="right") - 1]
     hours, radial = since_s / S_PER_H, np.hypot(*position_m.T)
     rate = slope_through_origin(hours, radial / M_PER_NAUTICAL_MILE, np.ones(len(hours)))
     per_hour2 = float(np.sum(hours**2)) * MEAN_S
-    sigma = noise.position_m * np.sqrt(2.0 * noise.position_s / max(per_hour2, 1e-9)) / M_PER_NAUTICAL_MILE
+    own = 2.0 * noise.position_s / max(per_hour2, 1e-9)
+    of_first = (float(np.sum(hours)) * MEAN_S / max(per_hour2, 1e-9)) ** 2 if from_first else 0.0
+    sigma = noise.position_m * np.sqrt(own + of_first) / M_PER_NAUTICAL_MILE
     largest = int(np.argmax(radial))
     found: dict[str, object] = {
         "rate_nmiph": Measured(rate, float(NORMAL_95 * sigma)),
-        "largest_m": Measured(float(radial[largest]), NORMAL_95 * noise.position_m),
+        "largest_m": Measured(float(radial[largest]), NORMAL_95 * noise.position_m * np.sqrt(1.0 + from_first)),
         "largest_at_s": float(time_s[largest]),
     }
     late = since_s > RATE_FROM_S
