@@ -19,11 +19,13 @@ from groundstation.systems.trajectory.states import (
     LAG,
     LAT,
     LEV,
+    MG,
     MNT,
     NO_RATE,
     NO_SLIP,
     POS,
     POSITION,
+    SG,
     SLOW,
     STILL,
     VEL,
@@ -156,8 +158,12 @@ def observe(m: int, seen: Seen, now: Now, room: Room) -> None:
             _put(room, i, 0, VEL + i, 1.0)
     elif kind == NO_RATE:
         for i in range(3):
-            y[i] = seen.value[m, i] - value[BG + i]
             _put(room, i, 0, BG + i, 1.0)
+            y[i] = seen.value[m, i] - value[BG + i]
+            for j in range(3):  # scale and misalignment act on what is read, as in the strapdown
+                at = SG + i if j == i else MG + 2 * i + j - (1 if j > i else 0)
+                y[i] -= value[at] * seen.value[m, j]
+                _put(room, i, 1 + j, at, seen.value[m, j])
     elif kind == NO_SLIP:
         vx = C[0, 0] * nav[3] + C[1, 0] * nav[4] + C[2, 0] * nav[5]
         vy = C[0, 1] * nav[3] + C[1, 1] * nav[4] + C[2, 1] * nav[5]

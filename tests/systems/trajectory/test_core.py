@@ -24,12 +24,15 @@ from groundstation.systems.trajectory.states import (
     LAG,
     LAT,
     LEV,
+    MG,
+    MISALIGNED,
     MNT,
     NAVIGATION,
     NO_RATE,
     NO_SLIP,
     POS,
     POSITION,
+    SG,
     SLOW,
     STATES,
     STILL,
@@ -126,6 +129,20 @@ def test_rows_are_derivatives_of_what_is_measured(family: Family, time_s: float,
     kept = [state for state in range(STATES) if state not in LEFT_OUT or kind not in (POSITION, VELOCITY)]
     assert off[:, kept].max() < ROW
     assert (np.abs(found).max(axis=1) > 0.0).all()
+
+
+def test_no_rate_holds_what_the_strapdown_takes_off() -> None:
+    """Scale and misalignment act on the bias too: half a degree a second of it is read through them."""
+    flight = perfect("uav")
+    value, read = value_of(np.random.default_rng(2)), np.radians([0.5, -0.4, 0.3])
+    errors = np.diag(value[SG : SG + 3])
+    for at, (reads, turned) in enumerate(MISALIGNED):
+        errors[reads, turned] = value[MG + at]
+    value[BG : BG + 3] = read - errors @ read
+    start, zero = start_at(flight, 10.0, value), np.zeros((1, 3))
+    seen = Seen(np.array([NO_RATE]), np.zeros(1), read[None], np.ones((1, 3)), zero, zero)
+    linear = carried(samples_of(flight), plan_of(samples_of(flight), [1000], seen, [0, 1]), start)
+    assert np.abs(linear.z[:3]).max() < 1e-12
 
 
 def short_problem(family: Family, epochs: int, *, with_line: bool = False) -> tuple[Pass, Seen, FloatArray]:
