@@ -11,6 +11,7 @@ from groundstation.base.units import M_PER_NAUTICAL_MILE
 from groundstation.pipeline.verbs.synthesis import KeptRuns
 from groundstation.simulation.ins_units.family import BAD_INPUTS, BROKEN, FAULT_CASES, healthy_flight
 from groundstation.simulation.ins_units.flight import simulate_units
+from groundstation.systems.inertial.study import units
 from groundstation.systems.inertial.study.units import study_units
 from groundstation.systems.inertial.study.units_runs import (
     EXPECTED_KIND,
@@ -150,13 +151,19 @@ def test_the_truth_of_the_table_is_that_of_the_simulated_errors() -> None:
 
 
 @pytest.mark.slow
-def test_study_writes_its_tables_and_page() -> None:
+def test_study_writes_its_tables_and_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    few = tuple(replace(case_of(name), flights=2) for name in ("drift 8", "stuck 60 s", "clock 0.5 s", "clocks"))
+    cases = (replace(CASES[0], flights=4), *few)
+    monkeypatch.setattr(units, "units_cases", lambda _runs, _seed: cases)
     lines: list[str] = []
-    study = study_units(runs=10, seed=SEED, progress=lines.append)
+    study = study_units(runs=12, seed=SEED, progress=lines.append)
     tables = {table.name: table for table in study.tables}
     assert {"units_false_alarms", "units_faults", "units_bad_inputs", "units_coverage", "units_broken"} <= set(tables)
-    assert tables["units_false_alarms"]["flights"][0] == 10
-    assert len(lines) == sum(case.flights for case in units_cases(10, SEED))
-    for text in ("False alarms", "Coverage of the intervals", "Assumptions broken"):
+    assert tables["units_false_alarms"]["flights"][0] == 4
+    assert len(lines) == 12
+    assert set(tables["units_faults"]["fault"]) == {"drift", "stuck"}
+    for text in ("False alarms", "Coverage of the intervals", "Assumptions broken", "12 of 12 flights"):
         assert text in study.markdown
-    assert study.markdown == study_units(runs=10, seed=SEED).markdown
+    assert study.markdown == study_units(runs=12, seed=SEED).markdown
+    early = study_units(runs=12, seed=SEED, minutes=0.0)
+    assert "5 of 12 flights" in early.markdown
