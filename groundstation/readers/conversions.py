@@ -6,13 +6,16 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
+from groundstation.base import arrow_values as arrow
 from groundstation.base.records import Column
 from groundstation.readers import cells, dms
 from groundstation.readers.cells import TableCells
 from groundstation.readers.layout import LayoutRule, TableLayout, number_of
 from groundstation.readers.rows import restore_delimiters
 
+_SIDES = {"latitude_deg": ("N", "S"), "longitude_deg": ("E", "W")}  # letters of a positive sign and a negative one
 _FILLERS: Mapping[str, float | str | bool] = {"double": float("nan"), "bool": False, "text": ""}
 
 
@@ -63,6 +66,31 @@ def read_cells(rule: LayoutRule, array: Any, layout: TableLayout, delimiter: str
     if rule.form == "variance":
         return cells.roots(read), "cells that are not a variance"
     return read, what
+
+
+def sided(read: TableCells, letters: Any, field: str) -> tuple[TableCells, str]:
+    """Return latitudes or longitudes with the sign that letters of another column give.
+
+    The letter is the first of the cell: N, S, north. A row without one, or with a minus that the letter contradicts, is
+    unreadable. Returns also words for that.
+
+    Examples
+    --------
+    >>> read = cells.numbers(pa.array(["47.5", "33.8", "-33.8", "-1", "2"]))
+    >>> read, _what = sided(read, pa.array(["N", "s", "South", "N", None]), "latitude_deg")
+    >>> read.column.values.tolist(), read.unreadable.tolist()
+    ([47.5, -33.8, -33.8, nan, nan], [False, False, False, True, True])
+    """
+    plus, minus = _SIDES[field]
+    first = pc.utf8_slice_codeunits(pc.utf8_upper(cells.trimmed(letters)), 0, 1)
+    is_plus, is_minus = (arrow.mask(pc.fill_null(pc.equal(first, one), arrow.FALSE)) for one in (plus, minus))
+    values = read.column.values
+    is_told = (is_plus & ~(values < 0.0)) | is_minus
+    mask = read.column.mask
+    signed = np.where(is_minus, -np.abs(values), values)
+    found = Column(np.where(mask & is_told, signed, np.nan), mask & is_told)
+    what = f"cells that are no number, or have no {plus} or {minus} that agrees with it beside them"
+    return TableCells(found, read.unreadable | (mask & ~is_told)), what
 
 
 def _without_numbers(read: TableCells, missing: Sequence[str]) -> TableCells:

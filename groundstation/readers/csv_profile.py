@@ -111,7 +111,7 @@ def _best(source: Source) -> tuple[float, Fit] | None:
 def _named_by(profile: Profile, encoding: str, lines: Sequence[HeadLine]) -> Fit | None:
     """Match a profile without a first line to a table that has all columns it needs."""
     fit = None if profile.names else _fit(profile, encoding, lines)
-    wanted = [rule.name for rule in profile.columns if not rule.is_optional]
+    wanted = [name for rule in profile.columns if not rule.is_optional for name in rule.names]
     is_all = fit is not None and all(name in fit.position for name in wanted)
     return fit if is_all and len({*wanted, *profile.required}) >= DISTINCTIVE_COLUMNS - 1 else None
 
@@ -403,7 +403,7 @@ def _slips(fit: Fit) -> dict[tuple[str, str], tuple[str, str]]:
 
     Returns, by raw topic and name, the name found and the name that was probably meant.
     """
-    known = (*(rule.name for rule in fit.profile.columns), *(name for name in fit.profile.time.columns))
+    known = (*(name for rule in fit.profile.columns for name in rule.names), *fit.profile.time.columns)
     return {(fit.profile.raw_topic, name): (name, meant) for name, meant in slips(fit.names, known).items()}
 
 

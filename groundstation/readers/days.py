@@ -7,6 +7,7 @@ import numpy as np
 
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
+from groundstation.readers.months import with_number
 
 _DAY_NS = 86_400 * NS_PER_S
 _WEEK_NS, _NEAR_NS = 7 * _DAY_NS, 3600 * NS_PER_S  # an hour about the end of a week
@@ -17,14 +18,21 @@ _EPOCH_DAY = datetime(1970, 1, 1).toordinal()
 def day_ns(text: str, formats: tuple[str, ...]) -> int | None:
     """Return the beginning of a day, ns since 1970; None where no strptime format fits.
 
+    The name of a month (%b, %B) may be that of another language.
+
     Examples
     --------
     >>> day_ns("2/1/70", ("%Y-%m-%d", "%d/%m/%y"))
     86400000000000
+    >>> day_ns("2 Jän 1970", ("%d %b %Y",))
+    86400000000000
     """
+    text = with_number(text)
     for form in formats:
         try:
-            found_ns = (datetime.strptime(text, form).toordinal() - _EPOCH_DAY) * _DAY_NS
+            found_ns = (
+                datetime.strptime(text, form.replace("%b", "%m").replace("%B", "%m")).toordinal() - _EPOCH_DAY
+            ) * _DAY_NS
         except ValueError:
             continue
         if abs(found_ns) < _LAST_NS:

@@ -49,6 +49,8 @@ class LayoutRule:
         Texts and numbers that mean no value.
     part : int
         Which of several words of the cell, from 1; 0: the whole cell.
+    side : int, optional
+        Position of the column whose letters N, S, E or W give the sign.
     """
 
     column: int
@@ -63,6 +65,7 @@ class LayoutRule:
     values: tuple[tuple[str, float | str | bool], ...] = ()
     missing: tuple[str, ...] = ()
     part: int = 0
+    side: int | None = None
 
     @property
     def is_parsed(self) -> bool:

@@ -25,7 +25,7 @@ class ColumnRule:
 
     ``north`` is that of a direction where the file says nothing else; ``unit_factor`` is the unit's part of the factor.
     A column that is optional is not missed. ``form``, ``values``, ``missing`` and ``part`` are those of
-    :class:`groundstation.readers.layout.LayoutRule`.
+    :class:`groundstation.readers.layout.LayoutRule`. ``side``: the column of letters that gives the sign.
     """
 
     name: str
@@ -40,6 +40,12 @@ class ColumnRule:
     values: tuple[tuple[str, float | str | bool], ...] = ()
     missing: tuple[str, ...] = ()
     part: int = 0
+    side: str = ""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Columns that the rule needs."""
+        return (self.name, self.side) if self.side else (self.name,)
 
 
 @dataclass(frozen=True)

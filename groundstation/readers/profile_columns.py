@@ -12,7 +12,8 @@ from groundstation.readers.told import HPA_PER_INHG
 
 DIRECTIONS = ("track_deg", "true_heading_deg")  # directions of which a profile may state the north
 _ANGLES: Mapping[str, Form] = {"dms": "dms", "ddmm": "ddmm"}  # units that are written in a form of their own
-_OF_CELLS = ("values", "variance", "missing", "part")
+_OF_CELLS = ("values", "variance", "missing", "part", "side")
+_SIDED = ("latitude_deg", "longitude_deg")
 
 
 class ColumnChecker(Checker):
@@ -63,7 +64,10 @@ class ColumnChecker(Checker):
         if part != int(part) or not 0 <= part <= 20:
             self.fail(f"{key}.part", f"{part:g}", "a whole number from 1 to 20")
         own = self.missing(given.get("missing", []), f"{key}.missing")
-        return replace(rule, missing=(*missing, *own), part=int(part))
+        side = self.text(given["side"], f"{key}.side") if "side" in given else ""
+        if side and (rule.field.name not in _SIDED or rule.values):
+            self.fail(f"{key}.side", rule.field.name, f"one of {', '.join(_SIDED)}, without values")
+        return replace(rule, missing=(*missing, *own), part=int(part), side=side)
 
     def missing(self, value: Any, key: str) -> tuple[str, ...]:
         """Return texts; numbers in the list are texts too."""

@@ -80,7 +80,7 @@ class _ProfileChecker(Checker):
         names = self.texts(recognise["names"], "recognise.names") if "names" in recognise else ()
         if time.date and time.date not in known:
             self.fail("time.date", repr(time.date), "a name of metadata.find, find_in_name or set")
-        if names and not {*(rule.name for rule in columns), *time.columns} <= set(names):
+        if names and not {*(name for rule in columns for name in rule.names), *time.columns} <= set(names):
             self.fail("recognise.names", ", ".join(names), "every column that the profile names")
         rows_after = self.number(recognise.get("rows_after_header", 0), "recognise.rows_after_header")
         if rows_after != int(rows_after) or not 0 <= rows_after <= 10:

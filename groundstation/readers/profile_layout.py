@@ -49,14 +49,19 @@ def layout_of(
     profile = fit.profile
     time = _time(fit)
     fed = _Fed({}, [], [])
-    found = [rule for rule in profile.columns if rule.name in fit.position]
+    found = [rule for rule in profile.columns if fit.position.keys() >= set(rule.names)]
     norths = _norths(fit, source, time, utc_of_zero_ns, end_byte)
     for rule in found:
         at = fit.position[rule.name]
         adapted = _adapted(rule, fit.told(at), fed.remarks)
         if adapted is not None:
             _feed(fit, adapted, at, norths, fed)
-    missing = [rule.name for rule in profile.columns if rule.name not in fit.position and not rule.is_optional]
+    missing = [
+        name
+        for rule in profile.columns
+        for name in rule.names
+        if name not in fit.position and (not rule.is_optional or (name == rule.side and rule.name in fit.position))
+    ]
     if missing:
         text = f"profile {profile.name} names columns that are not there: {_with_nearest(fit, missing)}"
         fed.remarks.append(Remark("missing_columns", text))
@@ -73,7 +78,7 @@ def _with_nearest(fit: Fit, missing: Sequence[str]) -> str:
 
     targets = {rule.name: f"{rule.topic}.{rule.field.name}" for rule in fit.profile.columns}
     free = [name for name in fit.names if name and name not in targets and name not in fit.profile.time.columns]
-    near = {name: nearest_names(name, targets[name], free) for name in missing[:_MOST_TOLD]}
+    near = {name: nearest_names(name, targets.get(name, ""), free) for name in missing[:_MOST_TOLD]}
     told = [f"{name} (nearest: {', '.join(found)})" if found else name for name, found in near.items()]
     return ", ".join(told) + (f" and {len(missing) - _MOST_TOLD} more" if len(missing) > _MOST_TOLD else "")
 
@@ -124,13 +129,13 @@ def _feed(fit: Fit, rule: ColumnRule, at: int, norths: Norths, fed: _Fed) -> Non
         text = f"{rule.name} counts from {north} north, by {by}"
         fed.remarks.append(Remark("north", text, rule.topic, (rule.field.name,)))
     if north != "magnetic":
-        fed.add(_with_cells(rule_for(at, rule.topic, rule.field, rule.factor, rule.offset, raw), rule))
+        fed.add(_with_cells(fit, rule_for(at, rule.topic, rule.field, rule.factor, rule.offset, raw), rule))
         return
     magnetic = field_of(rule.topic, "magnetic_heading_deg") if rule.field.name == "true_heading_deg" else None
     if magnetic is not None:
-        fed.add(_with_cells(rule_for(at, rule.topic, magnetic, rule.factor, rule.offset, raw), rule))
+        fed.add(_with_cells(fit, rule_for(at, rule.topic, magnetic, rule.factor, rule.offset, raw), rule))
     else:
-        fed.add(_with_cells(LayoutRule(at, *raw, "double", rule.factor, rule.offset), rule))
+        fed.add(_with_cells(fit, LayoutRule(at, *raw, "double", rule.factor, rule.offset), rule))
     variation = fit.profile.variation
     if variation is None or variation.column not in fit.position:
         if magnetic is None:
@@ -148,9 +153,10 @@ def _feed(fit: Fit, rule: ColumnRule, at: int, norths: Norths, fed: _Fed) -> Non
     fed.derivations.append(Derivation("true_from_magnetic", rule.topic, outputs, inputs, factors, not_zero))
 
 
-def _with_cells(made: LayoutRule, rule: ColumnRule) -> LayoutRule:
+def _with_cells(fit: Fit, made: LayoutRule, rule: ColumnRule) -> LayoutRule:
     """Return a rule of the layout with what the profile says of the cells."""
-    return replace(made, form=rule.form, values=rule.values, missing=rule.missing, part=rule.part)
+    side = fit.position[rule.side] if rule.side else None
+    return replace(made, form=rule.form, values=rule.values, missing=rule.missing, part=rule.part, side=side)
 
 
 def _raw_key(fit: Fit, name: str) -> Key:
@@ -185,7 +191,7 @@ def _raw(
     fit: Fit, rules: Iterable[LayoutRule], derivations: Sequence[Derivation], time: TimeRule
 ) -> Iterator[LayoutRule]:
     """Rules of columns that no other rule takes; derivations get numbers."""
-    taken = {rule.column for rule in rules} | set(time.columns)
+    taken = {at for rule in rules for at in (rule.column, rule.side)} | set(time.columns)
     inputs = {key for derivation in derivations for key in derivation.inputs}
     for at, name in enumerate(fit.names):
         key = (fit.profile.raw_topic, fit.label(at))
@@ -201,9 +207,9 @@ def _norths(fit: Fit, source: Source, time: TimeRule, utc_of_zero_ns: int | None
         return Norths()
     rules = [LayoutRule(fit.position[variation.column], LOOKED_AT, "variation_deg", "double", abs(variation.factor))]
     rules += [
-        LayoutRule(fit.position[one.name], LOOKED_AT, one.field.name, "double", one.factor)
+        _with_cells(fit, LayoutRule(fit.position[one.name], LOOKED_AT, one.field.name, "double", one.factor), one)
         for one in profile.columns
-        if one.topic == "gnss" and one.field.name in OF_MOTION and one.name in fit.position
+        if one.topic == "gnss" and one.field.name in OF_MOTION and fit.position.keys() >= set(one.names)
     ]
     layout = TableLayout(time, tuple(rules), decimal_comma=uses_decimal_comma(fit.first_rows, fit.delimiter))
     dialect = fit.dialect_to(end_byte)

@@ -24,7 +24,7 @@ from groundstation.base.records import (
 )
 from groundstation.base.signals import kind_of
 from groundstation.readers import cells
-from groundstation.readers.conversions import read_cells
+from groundstation.readers.conversions import read_cells, sided
 from groundstation.readers.days import DayCount
 from groundstation.readers.dialect import Dialect
 from groundstation.readers.inside import new_logs, with_own_zeros
@@ -170,6 +170,7 @@ class TableReader:
         layout = self._layout
         types = {rule.column: pa.float64() for rule in layout.rules}
         types |= {rule.column: pa.string() for rule in layout.rules if not rule.is_parsed}
+        types |= {rule.side: pa.string() for rule in layout.rules if rule.side is not None}
         types |= dict.fromkeys(layout.time.columns if with_time else (), pa.string())
         try:
             return self._parse(block, types, "," if layout.decimal_comma else ".")
@@ -178,7 +179,7 @@ class TableReader:
 
     def _fields(self, arrays: Mapping[int, Any], lines: Int64Array) -> dict[Key, Column]:
         """Columns of the rules, and those that are derived from them."""
-        columns = {rule.key: self._column(rule, arrays[rule.column], lines) for rule in self._layout.rules}
+        columns = {rule.key: self._column(rule, arrays, lines) for rule in self._layout.rules}
         for topic, by_field in self._places():
             columns |= self._placed(topic, by_field, columns, lines)
         for derivation in self._layout.derivations:
@@ -223,8 +224,10 @@ class TableReader:
         self._losses.add("unreadable_cells", "times that cannot be read", lines[read.unreadable], where=rule.names[0])
         return read.column
 
-    def _column(self, rule: LayoutRule, array: Any, lines: Int64Array) -> Column:
-        read, what = read_cells(rule, array, self._layout, self._dialect.delimiter)
+    def _column(self, rule: LayoutRule, arrays: Mapping[int, Any], lines: Int64Array) -> Column:
+        read, what = read_cells(rule, arrays[rule.column], self._layout, self._dialect.delimiter)
+        if rule.side is not None:
+            read, what = sided(read, arrays[rule.side], rule.field)
         self._losses.add("unreadable_cells", what, lines[read.unreadable], where=rule.target, topic=rule.topic)
         if read.cut is not None:
             what = f"texts cut to {MAX_TEXT_CHARACTERS} characters"

@@ -374,7 +374,7 @@ def test_a_profile_of_a_plug_in_is_found(own_profiles: Path, write: Write, monke
 def test_the_verb_writes_a_profile_that_the_other_verbs_take(write: Write, tmp_path: Path) -> None:
     table, target = write("a.csv", TABLE), tmp_path / "deep/my.toml"
     code, out, err = groundstation("profile", "new", str(table), "-o", str(target))
-    assert (code, err) == (0, "") and "ins.true_heading_deg" not in out  # one of its three cells is no number
+    assert (code, err) == (0, "") and "ins.true_heading_deg in deg" not in out  # one of its three cells is no number
     assert load(target).name == "a" and "gnss.latitude_deg in deg" in out
     assert groundstation("profile", "new", str(table), "-o", str(target))[0] == 2
     assert groundstation("profile", "new", str(table), "-o", str(target), "-f", "-q")[:2] == (0, "")

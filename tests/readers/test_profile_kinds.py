@@ -126,14 +126,15 @@ def test_degrees_and_minutes_run_together_with_the_side_in_a_column(write: Write
     text = table(head, lambda t, n, e, d: f"{t:%H%M%S}.00,{run_together(n)},N,{run_together(e)},E,19.4384,{d:.1f}\n")
     at = write("log_20240518.csv", text)
     profile, draft = drafted(at)
-    assert 'unit = "ddmm"' in draft and "all rows have E in 'EW'" in draft and "[metadata.find_in_name]" in draft
+    assert 'unit = "ddmm", side = "EW"' in draft and "[metadata.find_in_name]" in draft
     assert_flown(Read(at, profile))
     west = write("log_20240519.csv", text.replace(",E,", ",W,"))
     profile, draft = drafted(west)
-    assert 'unit = "ddmm", sign = -1' in draft
     assert Read(west, profile).values("gnss", "longitude_deg")[0] == -EAST_DEG
-    both = new_profile(write("c.csv", text.replace(",E,", ",W,", 50)))
-    assert any("has both E and W" in one for one in both.doubts)
+    both = Read(write("log_20240520.csv", text.replace(",E,", ",W,", 50)), profile).values("gnss", "longitude_deg")
+    assert all(one < 0.0 for one in both[:50]) and all(one > 0.0 for one in both[50:])
+    nameless = new_profile(write("c.csv", text.replace(",E,", ",W,", 50).replace(",EW,", ",,")))
+    assert any("has both E and W" in one for one in nameless.doubts)
 
 
 def test_rates_in_the_unit_that_the_turns_show(write: Write) -> None:
@@ -210,7 +211,7 @@ def test_nines_that_are_far_from_all_other_values_are_none(write: Write) -> None
     )
     at = write("a.tsv", "\ufefftime_s\tlat\tlon\talt_m\trpm\r\n" + rows)
     profile, text = drafted(at)
-    assert 'missing = ["-999.0", "9999"]' in text
+    assert "missing = [9999]" in text and "missing = [-999]" in text  # each in its column alone
     read = Read(at, profile)
     assert len([one for one in read.values("gnss", "latitude_deg") if one is not None]) == 40 and not read.damages
     assert {one for one in read.values("gnss", "altitude_msl_m") if one is not None} == {100.0}

@@ -40,9 +40,9 @@ def turned(guess: ColumnGuess, up: str | None) -> ColumnGuess:
         return guess
     is_field = match[1] == "magnetometer.field"
     if up is None:
-        return replace(guess, doubt=both(guess, "axes forward, right, down assumed"))
+        return replace(guess, doubt=both(guess.doubt, "axes forward, right, down assumed"))
     field, sign = _TURNED[up][_BODY_AXES.get(match[2], match[2])]
     names = {axis: name for name, axis in _BODY_AXES.items()}
     target = f"{match[1]}_{names[field] if is_field else field}_{match[3]}"
     reads = f"{up[1]} reads {up[0]}1 g: {_AXES_TOLD[up]} assumed to be forward, right, down"
-    return replace(guess, target=target, sign=sign, doubt=both(guess, reads))
+    return replace(guess, target=target, sign=sign, doubt=both(guess.doubt, reads))

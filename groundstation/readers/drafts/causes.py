@@ -16,9 +16,22 @@ _DMS = re.compile(
 )
 _SIDE = re.compile(r"[NSEWnsew]\s*\d{1,3}(?:\.\d*)?|\d{1,3}(?:\.\d*)?\s*°?\s*[NSEWnsew]")
 _WITH_UNIT = re.compile(r"[+-]?\d+(?:\.\d*)?\s*[A-Za-z°%/²]+[A-Za-z0-9/^²]*")
-MISSING = frozenset(
-    ("n/a", "na", "null", "none", "nil", "-", "--", "---", "*", "?", "inv", "invalid", "no data", "#n/a")
+_MISSING_WORDS = frozenset(
+    ("n/a", "na", "null", "none", "nil", "inv", "invalid", "no data", "nodata", "no fix", "unknown", "#value!", "#n/a")
 )
+_MARKS = re.compile(r"[-*?_#.~/:]+")  # ***, --.-
+_APART = re.compile(r"[+-]?\d{1,3}(?:[ \u00a0\u202f']\d{3})+(?:[.,]\d*)?")
+
+
+def is_missing(cell: str) -> bool:
+    """Tell whether a cell is a sign for no value.
+
+    Examples
+    --------
+    >>> is_missing("***"), is_missing("N/A"), is_missing("--.-"), is_missing("-1"), is_missing("")
+    (True, True, True, False, False)
+    """
+    return cell.lower() in _MISSING_WORDS or bool(_MARKS.fullmatch(cell))
 
 
 def date_order(cells: Sequence[str]) -> str:
@@ -104,7 +117,7 @@ def cause_of_numbers(cells: Sequence[str], delimiter: str) -> str:
     if not odd:
         return ""
     example = repr(odd[0][:40])
-    missing = [cell for cell in odd if cell.lower() in MISSING]
+    missing = [cell for cell in odd if is_missing(cell)]
     if len(missing) >= _SHARE * len(odd):
         return f"a sign for a missing value, {missing[0]!r}"
     if _most(odd, _COMMA.fullmatch) and delimiter == ",":
@@ -113,6 +126,8 @@ def cause_of_numbers(cells: Sequence[str], delimiter: str) -> str:
         )
     if _most(odd, _THOUSANDS.fullmatch):
         return f"commas between thousands, such as {example}: save them without"
+    if _most(odd, _APART.fullmatch):
+        return f"blanks between thousands, such as {example}: save them without"
     if _most(odd, _SIDE.fullmatch):
         return f"a letter for north, south, east or west in each cell, such as {example}"
     if _most(odd, _DMS.fullmatch):

@@ -159,10 +159,14 @@ def _is_unread(column: ColumnCheck) -> bool:
 
 def _columns(fit: Fit, layout: TableLayout, values: Mapping[Key, _Values], *, is_timed: bool) -> Iterator[ColumnCheck]:
     by_place = {rule.column: rule for rule in layout.rules}
+    sides = {rule.side: rule for rule in layout.rules if rule.side is not None}
     for at, name in enumerate(fit.names):
         rule = by_place.get(at)
         if at in layout.time.columns:
             yield ColumnCheck(name, "time", values=int(is_timed))
+        elif at in sides:
+            count = values.get(sides[at].key, _Values()).count
+            yield ColumnCheck(name, f"sign of {sides[at].target}", values=count)
         elif rule is not None:
             found = values.get(rule.key, _Values())
             known = field_of(*rule.key)
@@ -189,9 +193,10 @@ def _missing(fit: Fit, layout: TableLayout) -> Iterator[MissingColumn]:
     fed = {rule.key for rule in layout.rules} | {
         (one.topic, name) for one in layout.derivations for name in one.outputs
     }
-    taken = {rule.name for rule in fit.profile.columns} | set(fit.profile.time.columns)
+    taken = {name for rule in fit.profile.columns for name in rule.names} | set(fit.profile.time.columns)
     free = [name for name in fit.names if name and name not in taken]
     for rule in fit.profile.columns:
-        if rule.name not in fit.position and not (rule.is_optional or (rule.topic, rule.field.name) in fed):
+        lacking = [name for name in rule.names if name not in fit.position]
+        if lacking and not (rule.is_optional or (rule.topic, rule.field.name) in fed):
             target = f"{rule.topic}.{rule.field.name}"
-            yield MissingColumn(rule.name, target, nearest_names(rule.name, target, free))
+            yield MissingColumn(lacking[0], target, nearest_names(lacking[0], target, free))

@@ -10,7 +10,8 @@ class ColumnGuess:
     """One column: what it becomes, and why.
 
     ``target`` is empty where it is left; ``doubt`` is what the user has to look at. ``is_pair``: latitude and longitude
-    stand in each cell, and ``target`` is the latitude.
+    stand in each cell, and ``target`` is the latitude. ``side``:
+    the column of letters that gives the sign. ``missing``: numbers that mean no value.
     """
 
     at: int
@@ -26,6 +27,8 @@ class ColumnGuess:
     offset: float = 0.0
     is_pair: bool = False
     is_variance: bool = False
+    side: str = ""
+    missing: tuple[str, ...] = ()
 
     @property
     def line(self) -> str:
@@ -35,6 +38,7 @@ class ColumnGuess:
         unit = f", unit = {quoted(self.unit)}" * bool(self.unit)
         offset = f", offset = {self.offset:.9g}" * bool(self.offset)
         variance = ", variance = true" * self.is_variance
+        side = f", side = {quoted(self.side)}" * bool(self.side)
         north = f", north = {quoted(self.north)}" * bool(self.north)
         if self.is_pair:
             east = self.target.replace("latitude", "longitude")
@@ -43,11 +47,13 @@ class ColumnGuess:
                 for number, target in enumerate((self.target, east), start=1)
             )
             return f"{quoted(self.name)} = [{', '.join(parts)}]" + (f"  # {self.values}" if self.values else "")
-        entry = f"{quoted(self.name)} = {{ field = {quoted(self.target)}{unit}{scale}{sign}{offset}{north}{variance} }}"
+        missing = f", missing = [{', '.join(self.missing)}]" * bool(self.missing)
+        said = f"{unit}{scale}{sign}{offset}{north}{variance}{side}{missing}"
+        entry = f"{quoted(self.name)} = {{ field = {quoted(self.target)}{said} }}"
         notes = "; ".join(filter(None, (self.values, self.why, f"? {self.doubt}" if self.doubt else "")))
         return f"{entry}  # {notes}" if notes else entry
 
 
-def both(guess: ColumnGuess, doubt: str) -> str:
-    """Return the doubt of a guess with one more."""
-    return f"{guess.doubt}; {doubt}" if guess.doubt else doubt
+def both(one: str, other: str) -> str:
+    """Return two doubts as one."""
+    return "; ".join(filter(None, (one, other)))

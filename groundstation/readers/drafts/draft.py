@@ -12,7 +12,8 @@ import numpy as np
 from groundstation.readers.drafts.column import ColumnGuess
 from groundstation.readers.drafts.guesses import Guesses
 from groundstation.readers.drafts.sample import sample_of
-from groundstation.readers.drafts.times import TimeGuess, time_of
+from groundstation.readers.drafts.time_guess import TimeGuess
+from groundstation.readers.drafts.times import time_of
 from groundstation.readers.drafts.written import written
 from groundstation.readers.source import Source
 

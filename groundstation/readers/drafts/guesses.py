@@ -18,7 +18,7 @@ from groundstation.readers.drafts.column import ColumnGuess, both
 from groundstation.readers.drafts.motion import Motion, motion_of
 from groundstation.readers.drafts.positions import degrees_of, in_unit, is_pair, pair_of
 from groundstation.readers.drafts.sample import TableSample
-from groundstation.readers.drafts.times import TimeGuess
+from groundstation.readers.drafts.time_guess import TimeGuess
 from groundstation.readers.drafts.words import words_of
 
 _FLAGS = frozenset(("0", "1", "true", "false"))
@@ -57,7 +57,14 @@ class Guesses:
         found |= {one.at: one for one in self._by_target.values()}
         for at, guess in found.items():
             found[at] = self._in_unit(guess, moved) if guess.target else guess
-        return tuple(replace(one, values=one.values or self._values(one.at)) for one in found.values())
+        return tuple(
+            replace(
+                one,
+                values=one.values or self._values(one.at),
+                missing=tuple(map(_toml_number, self._sample.number_signs(one.at))),
+            )
+            for one in found.values()
+        )
 
     def _by_name(self, at: int) -> ColumnGuess:
         sample = self._sample
@@ -80,8 +87,8 @@ class Guesses:
         if known.unit == "deg" and are_angles(sample.filled(at)):
             return replace(left, target=meaning.target, sign=meaning.sign, unit="dms")
         if not sample.is_of_numbers(at):
-            cause = cause_of_numbers(sample.filled(at), sample.delimiter)
-            return replace(left, doubt=f"looks like {meaning.target}, but has {cause}" if cause else "")
+            cause = cause_of_numbers(sample.filled(at), sample.delimiter) or "cells that are no numbers"
+            return replace(left, doubt=f"looks like {meaning.target}, but has {cause}")
         return replace(
             left,
             target=meaning.target,
@@ -114,7 +121,7 @@ class Guesses:
             if north is not None and north.is_pair:
                 return motion_of(*pair_of(self._sample, north.at), self._time.seconds, sizes)
             if north is not None and east is not None:
-                both = (in_unit(self._sample, north, east), in_unit(self._sample, east, north))
+                both = (self._place(north, east), self._place(east, north))
                 degrees = [degrees_of(self._sample, one) for one in both]
                 moved = motion_of(degrees[0], degrees[1], self._time.seconds, sizes)
                 mirrored = motion_of(degrees[0], -degrees[1], self._time.seconds, sizes)
@@ -124,6 +131,9 @@ class Guesses:
                 self._by_target[east.target] = replace(both[1], sign=-1, doubt=doubt)
                 return mirrored
         return None
+
+    def _place(self, guess: ColumnGuess, other: ColumnGuess | None) -> ColumnGuess:
+        return in_unit(self._sample, guess, other, are_radians=self._are_radians())
 
     def _is_followed(self, moved: Motion) -> bool:
         """Tell whether a direction that is told in degrees is that of a motion."""
@@ -139,7 +149,7 @@ class Guesses:
             return guess
         if name in ("latitude_deg", "longitude_deg"):
             other = "latitude_deg" if name == "longitude_deg" else "longitude_deg"
-            return in_unit(self._sample, guess, self._by_target.get(f"{topic}.{other}"))
+            return self._place(guess, self._by_target.get(f"{topic}.{other}"))
         values = self._sample.numbers(guess.at) * guess.scale
         if name == "ground_speed_mps":
             return self._speed(guess, values, moved)
@@ -195,9 +205,11 @@ class Guesses:
             is_from_east, is_from_north = abs(offset - 90.0) < _FROM_EAST_DEG, abs(offset) < _FROM_EAST_DEG
             told = "from east" if is_from_east else "from north" if is_from_north else f"from {-offset:.0f} deg"
             doubt = f"turns against the motion: counted anticlockwise {told}"
-            return replace(guess, sign=-1, offset=90.0 / factor if is_from_east else 0.0, doubt=both(guess, doubt))
+            return replace(
+                guess, sign=-1, offset=90.0 / factor if is_from_east else 0.0, doubt=both(guess.doubt, doubt)
+            )
         if name == "true_heading_deg" and "true" not in words_of(guess.name):
-            guess = replace(guess, doubt=both(guess, "true north assumed"))
+            guess = replace(guess, doubt=both(guess.doubt, "true north assumed"))
         has_variation = any(one is not None and one.role == "variation" for one in self._sample.meanings)
         if name == "magnetic_heading_deg" and has_variation and "ins.true_heading_deg" not in self._by_target:
             return replace(guess, target="ins.true_heading_deg", north="magnetic")
@@ -241,6 +253,17 @@ class Guesses:
         kinds = list(dict.fromkeys(sample.filled(at)))
         shown = ", ".join(_shortened(one) for one in kinds[:3])
         return f"text: {shown}{', ...' if len(kinds) > 3 else ''}" if kinds else ""
+
+
+def _toml_number(text: str) -> str:
+    """Return a number as TOML has it.
+
+    Examples
+    --------
+    >>> _toml_number("-9999"), _toml_number("9999."), _toml_number("-999,0")
+    ('-9999', '9999', '-999')
+    """
+    return f"{float(text.replace(',', '.')):.12g}"
 
 
 def _is_plainer(name: str, other: str) -> bool:

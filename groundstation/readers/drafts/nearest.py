@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from groundstation.base.errors import GroundstationError, near_names
 from groundstation.readers.drafts.sample import TableSample, sample_of
-from groundstation.readers.drafts.times import TimeGuess, time_of
+from groundstation.readers.drafts.time_guess import TimeGuess
+from groundstation.readers.drafts.times import time_of
 from groundstation.readers.drafts.words import meaning_of
 from groundstation.readers.profile import Profile
 from groundstation.readers.source import Source

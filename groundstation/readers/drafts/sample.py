@@ -18,7 +18,7 @@ from groundstation.readers.dialect import (
     split_cells,
     uses_decimal_comma,
 )
-from groundstation.readers.drafts.causes import MISSING
+from groundstation.readers.drafts.causes import is_missing
 from groundstation.readers.drafts.words import Meaning, meaning_of
 from groundstation.readers.magic import is_binary, is_wide_text
 from groundstation.readers.source import Source
@@ -29,6 +29,14 @@ _TIME = re.compile(
     r"\d{1,2}-[A-Za-z]{3}-\d{4}.*|\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}.*|\d{1,2}:\d\d(?::\d\d)?(?:[.,]\d*)?(?: ?[AaPp][Mm])?"
 )
 _NINES = re.compile(r"-?9{3,}(?:\.(?:0*|9*))?")  # 9999, -999.0: no value, where all others are far from it
+# Numbers for no value of the automatic identification of ships (ITU-R M.1371).
+_OF_SHIPS = {
+    "true_heading_deg": 511.0,
+    "latitude_deg": 91.0,
+    "longitude_deg": 181.0,
+    "track_deg": 360.0,
+    "ground_speed_mps": 102.3,
+}
 _FIRST_LINES, _MOST_BEHIND = 2000, 10
 _WINDOWS, _WINDOW_BYTES = 8, 32 << 10  # later pieces of the file that are looked at
 _MOST_ROWS = 1000  # of each piece
@@ -96,7 +104,7 @@ class TableSample:
         """Return a column as numbers; NaN where a cell is none, or a sign for that."""
         if at not in self._numbers:
             signs, values = self.signs(at), self._plain_numbers(at)
-            if any(_NINES.fullmatch(sign) for sign in signs):
+            if any(_NUMBER.fullmatch(sign) for sign in signs):
                 values[[cell in signs for cell in self.columns[at]]] = np.nan
             self._numbers[at] = values
         return self._numbers[at]
@@ -126,7 +134,17 @@ class TableSample:
         return self._signs[at]
 
     def _found_signs(self, at: int) -> set[str]:
-        words = {cell for cell in self.columns[at] if cell.lower() in MISSING}
+        return self._words_or_nines(at) | self._of_ships(at)
+
+    def _of_ships(self, at: int) -> set[str]:
+        """Return the numbers by which ships say that a direction, a place or a speed is not known."""
+        meaning = self.meanings[at]
+        number = _OF_SHIPS.get(meaning.field, np.nan) if meaning is not None else np.nan
+        is_sure = number > 360.0 or number in (91.0, 181.0) or any(name.lower() == "mmsi" for name in self.names)
+        return {cell for cell in set(self.columns[at]) if self.number(cell) == number} if is_sure else set()
+
+    def _words_or_nines(self, at: int) -> set[str]:
+        words = {cell for cell in self.columns[at] if is_missing(cell)}
         nines = {cell for cell in self.columns[at] if _NINES.fullmatch(cell)}
         if not nines:
             return words
@@ -137,11 +155,15 @@ class TableSample:
         is_far |= len(known) > 0 and bool(np.all(np.abs(odd) > far))
         return words | nines if is_far else words
 
+    def number_signs(self, at: int) -> tuple[str, ...]:
+        """Return the numbers that mean no value in a column; elsewhere they may be values."""
+        return tuple(sorted(sign for sign in self.signs(at) if _NUMBER.fullmatch(sign)))
+
     def is_of_numbers(self, at: int) -> bool:
         """Tell whether a column is one of numbers."""
-        filled = len(self.filled(at))
-        found = int(np.count_nonzero(np.isfinite(self.numbers(at))))
-        return filled > 0 and found >= ENOUGH * filled
+        filled = self.filled(at)
+        known = int(np.count_nonzero(np.isfinite(self.numbers(at))))
+        return known > 0 and known >= ENOUGH * sum(cell.lower() != "nan" for cell in filled)
 
     def parts(self, at: int) -> Iterator[FloatArray]:
         """Yield the numbers of a column, piece by piece."""

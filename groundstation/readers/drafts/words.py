@@ -34,6 +34,7 @@ _PADDING = (
             "value",
             "data",
             "sensor",
+            "field",
         ]
     )
 )
@@ -258,7 +259,7 @@ _ROLES: tuple[tuple[str, str], ...] = (
         r"|from .*|elapsed"
         r"|of (?:day|fix)|pc|fine))?|unix|utc|seconds|millis|millisecond|timeusec|seconds elapsed|время"
         r"|date time .*|timestamp .*"
-        r"|isodatetime|iso ?8601|base date time|(?:date ?time|time) ?utc|elapsed",
+        r"|ms|msec|us|usec|isodatetime|iso ?8601|base date time|(?:date ?time|time) ?utc|elapsed",
         "time",
     ),
     (r"(?:gps|utc|local|lcl)? ?date(?: utc| gps)?|дата|day", "date"),
@@ -273,6 +274,11 @@ _COMPILED_SIGMAS = tuple(
     (re.compile(f"{what} ?(?:{axes})|(?:{axes}) ?{what}"), field, kind, is_variance)
     for what, is_variance in ((_SIGMA, False), (_SQUARE, True))
     for axes, field, kind in _SIGMAS
+)
+# The matrix of a position in a robot's message: rows and columns east, north, up.
+_COMPILED_SIGMAS += tuple(
+    (re.compile(f"(?:position )?cov(?:ariance)? ?{place}"), field, "m", True)
+    for place, field in ((0, "position_east_sigma_m"), (4, "position_north_sigma_m"), (8, "vertical_sigma_m"))
 )
 _COMPILED_TRIADS = tuple((re.compile(pattern), topic, field, kind) for pattern, topic, field, kind in _TRIADS)
 _COMPILED_ROLES = tuple((re.compile(pattern), role) for pattern, role in _ROLES)

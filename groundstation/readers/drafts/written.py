@@ -7,7 +7,7 @@ from pathlib import Path
 from groundstation.base.toml_text import quoted
 from groundstation.readers.drafts.column import ColumnGuess
 from groundstation.readers.drafts.sample import TableSample
-from groundstation.readers.drafts.times import TimeGuess
+from groundstation.readers.drafts.time_guess import TimeGuess
 
 MOST_LEFT = 100  # columns left over that the draft lists one by one
 _MOST_REQUIRED = 2  # besides the time: another name of any other column is told with the nearest ones
@@ -16,7 +16,8 @@ _MOST_REQUIRED = 2  # besides the time: another name of any other column is told
 def written(sample: TableSample, time: TimeGuess, columns: Sequence[ColumnGuess]) -> str:
     """Return the draft as TOML."""
     used = [one for one in columns if one.target]
-    left = [one for one in columns if not one.target]
+    sides = {one.side for one in used}
+    left = [one for one in columns if not one.target and one.name not in sides]
     return "\n".join(
         (
             f"# Draft by `groundstation profile new` for {_comment(sample.name)}.",
@@ -77,8 +78,8 @@ def _key(sample: TableSample) -> Iterator[str]:
 
 
 def _signs(sample: TableSample, used: Sequence[ColumnGuess]) -> Iterator[str]:
-    """Yield the signs for missing values in the columns that become fields."""
-    found = sorted({sign for one in used for sign in sample.signs(one.at)})
+    """Yield the words and marks for missing values in the columns that become fields."""
+    found = sorted({sign for one in used for sign in sample.signs(one.at) - set(sample.number_signs(one.at))})
     if found:
         yield f"missing = [{', '.join(map(quoted, found))}]"
 
