@@ -11,7 +11,8 @@ from groundstation.methods.roles import InsKinds
 from groundstation.results.answer import Answers, answer_of
 from groundstation.systems.analysis import Analysis, Found, RestsOn, Shortfall, main_numbers
 from groundstation.systems.inertial.answer import InertialResult
-from groundstation.systems.inertial.columns import FORECAST_COLUMNS, INERTIAL_COLUMNS, UNITS_COLUMNS
+from groundstation.systems.inertial.cause_answer import CausesResult
+from groundstation.systems.inertial.columns import CAUSES_COLUMNS, FORECAST_COLUMNS, INERTIAL_COLUMNS, UNITS_COLUMNS
 from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.systems.inertial.judged_answer import judged_filter
 from groundstation.systems.inertial.settings import InertialSettings
@@ -20,6 +21,7 @@ from groundstation.systems.known import AircraftData, Known
 from groundstation.tables.phases import Phases
 
 if TYPE_CHECKING:
+    from groundstation.systems.inertial.estimate import Estimation
     from groundstation.tables.table import Flight
 
 FIELDS = ("latitude_deg", "longitude_deg", "velocity_north_mps", "velocity_east_mps")
@@ -98,20 +100,38 @@ def _ins_kinds(known: Known) -> InsKinds:
     return offered(known)
 
 
-def _run_forecast(_flight: "Flight", known: Known, settings: InertialSettings) -> Found[ForecastResult]:
+def _estimated(known: Known, analysis: str) -> "Estimation":
+    """Return the estimated errors of the INS.
+
+    NotAssessableError where it is not unaided, with what says so.
+    """
     from groundstation.systems.inertial.estimate import Estimation
-    from groundstation.systems.inertial.forecast import assess_forecast
     from groundstation.systems.inertial.kind import WHY_NOT
     from groundstation.tables.sources import AIDED
 
     estimation = known.workings_of(Estimation)
-    if estimation is None:
-        inertial = known.answer(InertialResult)
-        says = WHY_NOT[AIDED if inertial is None else inertial.kind]
-        why = f" ({inertial.kind_reason})" if inertial is not None else ""
-        judged = None if inertial is None else judged_filter(known.answers, inertial.ins_topic)
-        left = "its errors are not estimated" if judged is None else f"its errors are known {judged.by}, none grows"
-        raise NotAssessableError("forecast", f"{says}{why}: {left}")
+    if estimation is not None:
+        return estimation
+    inertial = known.answer(InertialResult)
+    says = WHY_NOT[AIDED if inertial is None else inertial.kind]
+    why = f" ({inertial.kind_reason})" if inertial is not None else ""
+    judged = None if inertial is None else judged_filter(known.answers, inertial.ins_topic)
+    left = "its errors are not estimated" if judged is None else f"its errors are known {judged.by}, none grows"
+    raise NotAssessableError(analysis, f"{says}{why}: {left}")
+
+
+def _run_causes(_flight: "Flight", known: Known, _settings: InertialSettings) -> Found[CausesResult]:
+    from groundstation.systems.inertial.causes import assess_causes
+
+    found = _estimated(known, "ins_causes")
+    start = found.result.navigation_start
+    return Found(assess_causes(found.compared, found.run, None if start is None else start.time_s))
+
+
+def _run_forecast(_flight: "Flight", known: Known, settings: InertialSettings) -> Found[ForecastResult]:
+    from groundstation.systems.inertial.forecast import assess_forecast
+
+    estimation = _estimated(known, "forecast")
     phases = known.phases
     return Found(assess_forecast(estimation, settings=settings, phase_of=phases.at, take_off_s=take_off_s(phases)))
 
@@ -205,6 +225,20 @@ FORECAST = Analysis(
     is_expected=_is_forecast_expected,
     columns=FORECAST_COLUMNS,
     is_main=_is_main_of_forecast,
+)
+CAUSES = Analysis(
+    name="ins_causes",
+    title="errors of an unaided INS by cause: Schuler, drift, azimuth, body axes, straight legs",
+    subject="INS errors by cause",
+    needs="what inertial needs, of an INS that GNSS does not correct, with velocities of both",
+    settings=InertialSettings,
+    answer=CausesResult,
+    run=_run_causes,
+    table="inertial",
+    requires=("inertial",),
+    is_expected=_is_forecast_expected,
+    columns=CAUSES_COLUMNS,
+    is_main=main_numbers(r"start_(mps|tilt_arcsec)\.value|parameters\.mean_drift_(north|east)\.value"),
 )
 UNITS = Analysis(
     name="ins_units",

@@ -2,6 +2,7 @@
 
 from groundstation.results.columns import AnswerColumn
 from groundstation.systems.inertial.answer import InertialResult
+from groundstation.systems.inertial.cause_answer import CauseParameter, CausesResult
 from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.systems.inertial.units_answer import UnitsResult
 
@@ -37,6 +38,35 @@ FORECAST_COLUMNS: tuple[AnswerColumn[ForecastResult], ...] = (
     ),
     AnswerColumn("forecast_60min_rms_m", "number", "after 60 min", lambda forecast: _rms_m(forecast, 60.0)),
     AnswerColumn("forecast_120min_rms_m", "number", "after 120 min", lambda forecast: _rms_m(forecast, 120.0)),
+)
+
+
+def _value(one: CauseParameter | None) -> float | None:
+    return None if one is None else one.value
+
+
+CAUSES_COLUMNS: tuple[AnswerColumn[CausesResult], ...] = (
+    AnswerColumn(
+        "schuler_start_mps",
+        "number",
+        "Schuler amplitude of the INS by its start",
+        lambda causes: causes.start_mps.value,
+        is_indexed=False,
+    ),
+    AnswerColumn(
+        "mean_drift_north_dph",
+        "number",
+        "mean drift of the north channel",
+        lambda causes: _value(causes.parameter("mean_drift_north")),
+        is_indexed=False,
+    ),
+    AnswerColumn(
+        "mean_drift_east_dph",
+        "number",
+        "the same, east",
+        lambda causes: _value(causes.parameter("mean_drift_east")),
+        is_indexed=False,
+    ),
 )
 UNITS_COLUMNS: tuple[AnswerColumn[UnitsResult], ...] = (
     AnswerColumn(

@@ -182,13 +182,13 @@ def run_coupled(
     begins = begins[begins < n]
     for begin, end in pairwise([*begins.tolist(), n]):
         use, factor = slice(begin, end), 1.0
-        stretch = _Stretch.over(values[use], interval[use], densities, is_first=begin == 0)
+        stretch = Stretch.over(values[use], interval[use], densities, is_first=begin == 0)
         if begin in returns:
             good, factor = _seam_at(begin, start, epochs, values, interval, densities, lines, settings.gate_sigmas**2)
             odd[begin:good] = True
         if factor > 1.0:
             start = kalman.Start(start.x, factor**2 * start.P, start.in_a_row)
-            stretch = _Stretch.over(values[use], interval[use], factor**2 * densities, is_first=False)
+            stretch = Stretch.over(values[use], interval[use], factor**2 * densities, is_first=False)
         jump = np.full(len(stretch.step), NO_STEP, dtype=np.int64)
         jump[stretch.last[epochs.is_reset[use]]] = 0
         shown = np.where(odd[use, None], np.nan, z[use]).ravel()
@@ -211,7 +211,7 @@ def run_coupled(
 
 
 @dataclass(frozen=True)
-class _Stretch:
+class Stretch:
     """Transitions over neighbouring epochs, with their steps.
 
     ``step`` is the transition of each step, ``last`` the step that ends at each epoch.
@@ -222,7 +222,7 @@ class _Stretch:
     last: Int64Array
 
     @classmethod
-    def over(cls, values: FloatArray, interval_s: FloatArray, densities: FloatArray, *, is_first: bool) -> "_Stretch":
+    def over(cls, values: FloatArray, interval_s: FloatArray, densities: FloatArray, *, is_first: bool) -> "Stretch":
         count = np.maximum(1, np.ceil(interval_s / LONGEST_STEP_S - 1e-9)).astype(np.int64)
         step = np.repeat(np.arange(len(count)), count)
         if is_first:
@@ -248,7 +248,7 @@ def _seam_at(
     if not len(fixes) or epochs.is_reset[back : fixes[-1] + 1].any():
         return back, 1.0
     use, rows = slice(back, int(fixes[-1]) + 1), fixes - back
-    stretch = _Stretch.over(values[use], interval_s[use], densities, is_first=back == 0)
+    stretch = Stretch.over(values[use], interval_s[use], densities, is_first=back == 0)
     unseen = kalman.Measurements(np.zeros(0, np.int64), np.zeros((0, 1)), np.zeros(0, np.int64), lines)
     ahead = kalman.run_filter(stretch.transition, stretch.step, unseen, start, kept=kalman.KeptArrays(gains=False))
     at, states = stretch.last[rows], CHANNELS[:, [POSITION, VELOCITY]].T.ravel()

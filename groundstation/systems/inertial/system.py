@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from groundstation.systems.inertial.analysis import FORECAST, INERTIAL, UNITS
+from groundstation.systems.inertial.analysis import CAUSES, FORECAST, INERTIAL, UNITS
 from groundstation.systems.system import FleetTab, InFleet, Study, System, Tab
 
 if TYPE_CHECKING:
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.chapters.chapter import Chapter
     from groundstation.systems.inertial.answer import InertialResult
+    from groundstation.systems.inertial.cause_answer import CausesResult
+    from groundstation.systems.inertial.cause_chapter import causes
     from groundstation.systems.inertial.chapter import SOURCES, inertial
     from groundstation.systems.inertial.forecast_answer import ForecastResult
     from groundstation.systems.inertial.forecast_chapter import forecast
@@ -25,6 +27,7 @@ def _chapters() -> "tuple[Chapter, ...]":
 
     return (
         Chapter((InertialResult,), inertial, sources=SOURCES),
+        Chapter((CausesResult,), causes),
         Chapter((UnitsResult,), units),
         Chapter((ForecastResult,), forecast, sources=SOURCES),
     )
@@ -68,11 +71,12 @@ def _advice() -> "Adviser":
 
 
 def _plots() -> "Mapping[str, Describe]":
+    from groundstation.systems.inertial import cause_plots as causes
     from groundstation.systems.inertial import forecast_plots as forecast
     from groundstation.systems.inertial import plots as inertial
     from groundstation.systems.inertial import units_plots as units
 
-    return {**forecast.PLOTS, **inertial.PLOTS, **units.PLOTS}
+    return {**causes.PLOTS, **forecast.PLOTS, **inertial.PLOTS, **units.PLOTS}
 
 
 def _compared() -> "tuple[Compared, ...]":
@@ -82,12 +86,14 @@ def _compared() -> "tuple[Compared, ...]":
 
 
 def _tabs() -> tuple[Tab, ...]:
+    from groundstation.systems.inertial.cause_tab import causes
     from groundstation.systems.inertial.forecast_tab import forecast
     from groundstation.systems.inertial.tab import inertial
     from groundstation.systems.inertial.units_tab import units
 
     return (
         Tab(("inertial",), inertial),
+        Tab(("ins_causes",), causes),
         Tab(("ins_units",), units),
         Tab(("forecast",), forecast),
     )
@@ -97,6 +103,12 @@ def _study_forecast() -> "Callable[..., StudyResult]":
     from groundstation.systems.inertial.study.forecast import study_forecast
 
     return study_forecast
+
+
+def _study_causes() -> "Callable[..., StudyResult]":
+    from groundstation.systems.inertial.study.causes import study_causes
+
+    return study_causes
 
 
 def _study_units() -> "Callable[..., StudyResult]":
@@ -113,12 +125,17 @@ def _outcome_units() -> type:
 
 SYSTEM = System(
     name="inertial",
-    analyses=(INERTIAL, FORECAST, UNITS),
+    analyses=(INERTIAL, CAUSES, FORECAST, UNITS),
     studies=(
         Study(
             "forecast",
             "forecast of INS errors: every method under true and false models, and how honest its sigma is",
             _study_forecast,
+        ),
+        Study(
+            "causes",
+            "INS errors by cause: coverage of every interval, on eight families and three that break assumptions",
+            _study_causes,
         ),
         Study(
             "units",

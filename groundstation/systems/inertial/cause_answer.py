@@ -1,0 +1,232 @@
+"""Answer on the causes of the errors of an unaided INS: shares, Schuler, body, legs."""
+
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal
+
+from groundstation.results.answer import Answer
+from groundstation.results.figures import FigureData
+from groundstation.systems.inertial.units_answer import Measured
+
+Cause = Literal["schuler", "drift", "azimuth", "body", "reset", "unexplained"]
+CAUSES: tuple[Cause, ...] = ("schuler", "drift", "azimuth", "body", "reset", "unexplained")
+ParameterName = Literal[
+    "mean_drift_north",
+    "mean_drift_east",
+    "drift_north",
+    "drift_east",
+    "gyro_forward",
+    "gyro_right",
+    "accelerometer_forward",
+    "accelerometer_right",
+    "tilt_north",
+    "tilt_east",
+    "azimuth",
+]
+PARAMETERS: tuple[ParameterName, ...] = (
+    "mean_drift_north",
+    "mean_drift_east",
+    "drift_north",
+    "drift_east",
+    "gyro_forward",
+    "gyro_right",
+    "accelerometer_forward",
+    "accelerometer_right",
+    "tilt_north",
+    "tilt_east",
+    "azimuth",
+)
+
+
+@dataclass(frozen=True)
+class Within95:
+    """Value with the ends of its 95 % interval."""
+
+    schema_name: ClassVar[str] = "within95"
+
+    value: float
+    low95: float
+    high95: float
+
+
+@dataclass(frozen=True)
+class CauseShare:
+    """Share of the mean square velocity error that a cause explains.
+
+    The shares of all causes add up to one. One may be negative, or above one: where two causes cancel.
+    """
+
+    schema_name: ClassVar[str] = "cause_share"
+
+    name: Cause = field(metadata={"one_of": CAUSES})
+    share: Within95
+
+
+@dataclass(frozen=True)
+class CauseParameter:
+    """Constant of the INS that the coupled model estimates over the whole flight.
+
+    Parameters
+    ----------
+    name : str
+        ``mean_drift``: the constant drift of a channel, all that makes it together, mean over the flight. ``drift``:
+        its part that stays north and east when the aircraft turns. ``gyro``, ``accelerometer``: fixed to the body.
+        ``tilt``: less what an accelerometer bias makes of it on the first heading. ``azimuth``: at the start.
+    value, half95 : float
+        In ``unit``, with half of the 95 % interval.
+    observability : float
+        1 - sigma / sigma before the flight, 0 to 1; ``is_observable`` above one half.
+    """
+
+    schema_name: ClassVar[str] = "cause_parameter"
+
+    name: ParameterName = field(metadata={"one_of": PARAMETERS})
+    title: str
+    unit: str
+    value: float
+    half95: float
+    observability: float
+    is_observable: bool
+
+
+@dataclass(frozen=True)
+class SchulerWave:
+    """Schuler oscillation of the velocity error of a channel.
+
+    v = offset + amplitude cos(rate x time - phase), time since the first comparison.
+
+    Parameters
+    ----------
+    amplitude_mps : Within95
+        As the start and the constant drift make it.
+    phase_deg : Within95 or None
+        None where the interval is wider than half a turn.
+    tilt_arcsec, bias_ug : Within95
+        Initial tilt and accelerometer bias that alone would make such an amplitude.
+    offset_mps : Within95
+        About which it swings: - R x mean drift.
+    end_mps : Within95
+        Amplitude at the last comparison; what random drift added or took is in it.
+    """
+
+    schema_name: ClassVar[str] = "schuler_wave"
+
+    channel: str = field(metadata={"one_of": ("north", "east")})
+    amplitude_mps: Within95
+    phase_deg: Within95 | None
+    tilt_arcsec: Within95
+    bias_ug: Within95
+    offset_mps: Within95
+    end_mps: Within95
+
+
+@dataclass(frozen=True)
+class StraightLeg:
+    """Straight leg of the flight with its errors along and across the course.
+
+    Across is positive to the right. ``rate`` is change of position error over time, ``change`` that of the velocity
+    error from the first to the last half minute; None where GNSS is missing at an end.
+    """
+
+    schema_name: ClassVar[str] = "straight_leg"
+
+    start_s: float
+    end_s: float
+    course_deg: float
+    length_km: float
+    along_rate_nmiph: Measured | None
+    across_rate_nmiph: Measured | None
+    along_change_mps: Measured | None
+    across_change_mps: Measured | None
+
+
+@dataclass(frozen=True)
+class ErrorWindow:
+    """Radial error after some hours.
+
+    ``since_start_m`` is that of the flight itself, so long after navigation began. ``median_m`` and ``p95_m`` are of
+    the error that builds up in windows of this length, one every five minutes; they overlap, ``independent`` is how
+    many fit in one after the other.
+    """
+
+    schema_name: ClassVar[str] = "error_window"
+
+    hours: float
+    since_start_m: float | None
+    median_m: float | None
+    p95_m: float | None
+    windows: int
+    independent: int
+
+
+@dataclass(frozen=True)
+class AlongAcross:
+    """RMS of an error along and across the track, while the aircraft moves."""
+
+    schema_name: ClassVar[str] = "along_across"
+
+    quantity: str = field(metadata={"one_of": ("position", "velocity")})
+    unit: str
+    along: float
+    across: float
+
+
+@dataclass(frozen=True)
+class CausesResult(Answer):
+    """Errors of an unaided INS by cause.
+
+    Parameters
+    ----------
+    ins_topic, gnss_topic, ins_class : str
+    sentence : str
+        Conclusion in words.
+    hours : float
+        From the first to the last comparison.
+    schuler_period_min : float
+    heading_spread : float
+        1 - length of the mean of the headings as unit vectors while the aircraft moves: 0 on one heading.
+    is_parted : bool
+        Whether headings differ enough to part what is fixed to the body from what is fixed to north and east.
+    is_strapdown : bool
+        Of the class: whether its sensors turn with the aircraft.
+    resets : int
+        Resets of the INS, each with jumps of its own.
+    start_mps : Within95
+        Length of the Schuler amplitudes of both channels, as velocity error and tilt at the start make them;
+        ``start_tilt_arcsec`` is the initial tilt that alone would.
+    shares, parameters, schuler, legs, windows, along_across
+        The tables.
+    legs_left_out : int
+        Shorter legs that are not in the table.
+    """
+
+    analysis: ClassVar[str] = "ins_causes"
+    schema_name: ClassVar[str] = analysis
+
+    ins_topic: str
+    gnss_topic: str
+    ins_class: str
+    sentence: str
+    hours: float
+    schuler_period_min: float
+    heading_spread: float
+    is_parted: bool
+    is_strapdown: bool
+    resets: int
+    start_mps: Within95
+    start_tilt_arcsec: Within95
+    shares: tuple[CauseShare, ...]
+    parameters: tuple[CauseParameter, ...]
+    schuler: tuple[SchulerWave, ...]
+    legs: tuple[StraightLeg, ...]
+    legs_left_out: int
+    windows: tuple[ErrorWindow, ...]
+    along_across: tuple[AlongAcross, ...]
+    figures: tuple[FigureData, ...] = ()
+
+    def share(self, name: Cause) -> Within95:
+        """Return the share of a cause."""
+        return next(one.share for one in self.shares if one.name == name)
+
+    def parameter(self, name: ParameterName) -> CauseParameter | None:
+        """Return a constant, None where the class has none such."""
+        return next((one for one in self.parameters if one.name == name), None)

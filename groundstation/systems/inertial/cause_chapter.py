@@ -1,0 +1,221 @@
+"""Chapter on the errors of an unaided INS by cause: shares, Schuler, body axes, legs."""
+
+from groundstation.chapters.assessed import without_answer
+from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Mark, Note, Part, Section, kept
+from groundstation.chapters.wording import ABSENT, clock, number, typeset, unit_sign
+from groundstation.results.flight import FlightResults
+from groundstation.systems.inertial.cause_answer import (
+    CauseParameter,
+    CauseShare,
+    CausesResult,
+    ErrorWindow,
+    SchulerWave,
+    StraightLeg,
+    Within95,
+)
+from groundstation.systems.inertial.units_answer import Measured
+
+TITLE = "INS errors by cause"
+LEAD = (
+    "Constants of the INS fitted over the whole flight, under the random drift of its class. Error = INS − truth; "
+    "± and ranges are 95 %."
+)
+PLACES = {"dph": 4, "ug": 0, "arcsec": 1, "deg": 3}
+CAUSES: dict[str, tuple[str, str]] = {
+    "schuler": ("Schuler oscillation from the start", "velocity error and tilt at the start"),
+    "drift": ("Constant drift, north and east", "gyros and azimuth together, mean over the flight"),
+    "azimuth": ("Azimuth error in turns", "what an azimuth error does beside a constant drift"),
+    "body": ("Fixed to the aircraft, turned with it", "accelerometer biases and gyro drifts, from the first turn on"),
+    "reset": ("Jumps at resets", ""),
+    "unexplained": ("Unexplained by constants", "random drift, random walk, gravity, noise of GNSS"),
+}
+
+
+def causes(results: FlightResults) -> Section | None:
+    """Return the chapter; None when the flight was not assessed and no reason is known."""
+    answer = results.answer(CausesResult)
+    if answer is None:
+        return without_answer(results, "ins_causes", TITLE, LEAD)
+    parts: tuple[Part | None, ...] = (
+        Note(f"{typeset(answer.sentence)}."),
+        _one_heading(answer),
+        _shares(answer),
+        Figure("causes.velocity"),
+        _schuler(answer),
+        _parameters(answer),
+        _legs(answer),
+        Figure("causes.along"),
+        _windows(answer),
+    )
+    return Section("ins_causes", TITLE, LEAD, kept(parts), _headline(answer), appendix=kept((_facts(answer),)))
+
+
+def _headline(answer: CausesResult) -> str:
+    top = max(answer.shares, key=lambda one: one.share.value)
+    return f"{CAUSES[top.name][0]}: {number(100.0 * top.share.value, 0, '%')}"
+
+
+def _one_heading(answer: CausesResult) -> Note | None:
+    if answer.is_parted or not answer.is_strapdown:
+        return None
+    return Note(
+        "The aircraft kept nearly one heading: what is fixed to it cannot be told from what is fixed to north and "
+        "east, nor an accelerometer bias from a tilt. Turns by 90° or more would tell.",
+        "unknown",
+    )
+
+
+def _within(one: Within95 | None, places: int) -> str:
+    if one is None:
+        return ABSENT
+    return f"{number(one.value, places)} ({number(one.low95, places)} … {number(one.high95, places)})"
+
+
+def _half(one: Measured | None, places: int) -> str:
+    return ABSENT if one is None else f"{number(one.value, places, signed=True)} ± {number(one.half95, places)}"
+
+
+def _shares(answer: CausesResult) -> Grid:
+    heads = (Head("Cause"), Head("Share, %", True), Head("95 %", True), Head("From"))
+    caption = (
+        "Of the mean square velocity error, both channels; all add up to 100 %. Below zero or above 100: two causes "
+        "cancel. A bias that acts like a tilt counts as tilt, an azimuth or gyro error that acts like a constant "
+        "drift as drift."
+    )
+    rows = [_share_row(one) for one in answer.shares if one.name != "reset" or answer.resets]
+    return Grid("What explains the error", heads, rows, caption, ("causes_over_time",))
+
+
+def _share_row(one: CauseShare) -> tuple[Cell, ...]:
+    title, remark = CAUSES[one.name]
+    low, high = (number(100.0 * end, 0) for end in (one.share.low95, one.share.high95))
+    return (title, number(100.0 * one.share.value, 0), f"{low} … {high}", remark)
+
+
+def _schuler(answer: CausesResult) -> Grid:
+    heads = (
+        Head("Channel"),
+        Head("Amplitude, m/s", True),
+        Head("Phase, °", True),
+        Head("As of a tilt, arcsec", True),
+        Head("As of a bias, µg", True),
+        Head("Offset, m/s", True),
+        Head("Amplitude at the end, m/s", True),
+    )
+    caption = (
+        f"Velocity error = offset + amplitude cos(angle − phase), a turn in {number(answer.schuler_period_min, 1)} min "
+        "from the first comparison on, by the start and the constant drift; at the end with what turns and random "
+        "drift made of it. The start alone (velocity error and tilt, both channels): "
+        f"{_within(answer.start_mps, 2)} m/s, as of a tilt of {_within(answer.start_tilt_arcsec, 1)} arcsec. "
+        "No phase: it may be any."
+    )
+    return Grid("Schuler oscillation", heads, [_wave_row(one) for one in answer.schuler], caption)
+
+
+def _wave_row(one: SchulerWave) -> tuple[Cell, ...]:
+    return (
+        one.channel.capitalize(),
+        _within(one.amplitude_mps, 2),
+        _within(one.phase_deg, 0),
+        _within(one.tilt_arcsec, 1),
+        _within(one.bias_ug, 0),
+        _within(one.offset_mps, 2),
+        _within(one.end_mps, 2),
+    )
+
+
+def _parameters(answer: CausesResult) -> Grid:
+    heads = (Head("Constant"), Head("Value", True), Head("±", True), Head("Seen", True), Head(""))
+    caption = (
+        "Seen: 1 − σ/σ before the flight; below 0.5 the value is mostly what the class assumes. What turns with the "
+        "aircraft is an accelerometer bias or a gyro drift in body axes, what stays north and east is not."
+    )
+    return Grid("Constants of the INS", heads, [_parameter_row(one) for one in answer.parameters], caption)
+
+
+def _parameter_row(one: CauseParameter) -> tuple[Cell, ...]:
+    places = PLACES.get(one.unit, 3)
+    return (
+        f"{one.title[:1].upper()}{one.title[1:]}, {unit_sign(one.unit)}",
+        number(one.value, places, signed=True),
+        number(one.half95, places),
+        number(one.observability, 2),
+        Mark("good", "Observable") if one.is_observable else Mark("unknown", "Not observable"),
+    )
+
+
+def _legs(answer: CausesResult) -> Grid | None:
+    if not answer.legs:
+        return None
+    heads = (
+        Head("Leg"),
+        Head("Course, °", True),
+        Head("Length, km", True),
+        Head("Error along, nmi/h", True),
+        Head("Across", True),
+        Head("Velocity change along, m/s", True),
+        Head("Across", True),
+    )
+    more = f" {answer.legs_left_out} shorter legs are left out." if answer.legs_left_out else ""
+    caption = (
+        "Straight for three minutes or more; across is to the right. Growth of the position error, and change of the "
+        f"velocity error from the first to the last half minute; ± is that of GNSS.{more}"
+    )
+    return Grid("Straight legs", heads, [_leg_row(one) for one in answer.legs], caption, ("causes_along",))
+
+
+def _leg_row(one: StraightLeg) -> tuple[Cell, ...]:
+    return (
+        f"{clock(one.start_s)} – {clock(one.end_s)}",
+        number(one.course_deg, 0),
+        number(one.length_km, 0),
+        _half(one.along_rate_nmiph, 2),
+        _half(one.across_rate_nmiph, 2),
+        _half(one.along_change_mps, 2),
+        _half(one.across_change_mps, 2),
+    )
+
+
+def _windows(answer: CausesResult) -> Grid | None:
+    if not answer.windows:
+        return None
+    heads = (
+        Head("Hours", True),
+        Head("Since navigation began, m", True),
+        Head("Windows, median, m", True),
+        Head("95 %, m", True),
+        Head("Windows", True),
+        Head("Independent", True),
+    )
+    caption = (
+        "Radial error so long after navigation began, and the error that builds up in windows of this length, one "
+        "every five minutes; they overlap. The rate by the fit through the origin stands with the INS errors."
+    )
+    return Grid("Error by time", heads, [_window_row(one) for one in answer.windows], caption)
+
+
+def _window_row(one: ErrorWindow) -> tuple[Cell, ...]:
+    return (
+        f"{one.hours:g}",
+        *(number(value, 0) for value in (one.since_start_m, one.median_m, one.p95_m)),
+        number(one.windows, 0),
+        number(one.independent, 0),
+    )
+
+
+def _facts(answer: CausesResult) -> Facts:
+    pairs = [
+        (f"{one.quantity.capitalize()} error RMS along / across the track", _both(one.along, one.across, one.unit), "")
+        for one in answer.along_across
+    ]
+    pairs += [
+        ("Fitted over", f"{number(answer.hours, 2)} h", f"{answer.ins_topic} against {answer.gnss_topic}"),
+        ("INS class", answer.ins_class or ABSENT, "random drift and what is assumed before the flight"),
+        ("Spread of headings", number(answer.heading_spread, 2), "0: one heading, 1: all alike"),
+    ]
+    return Facts("Errors along the track", pairs)
+
+
+def _both(along: float, across: float, unit: str) -> str:
+    places = 0 if unit == "m" else 2
+    return f"{number(along, places)} / {number(across, places)} {unit}"
