@@ -38,6 +38,7 @@ from groundstation.systems.reference.answer import ReferenceResult
 from groundstation.systems.several_logs.answer import Together
 from groundstation.tables.table import Flight
 from tests import report_example, viewer_example
+from tests.systems.inertial import causes_example
 from tests.systems.inertial.example import aided_figures, forecast_result, inertial_result
 from tests.systems.inertial.units_example import drift_of, gnss, units
 
@@ -68,6 +69,12 @@ def aided() -> FlightResults:
 def several_units() -> FlightResults:
     """Three INS, one of which drifts."""
     return report_example.example(judge_units(units(3, bad=drift_of(0.3)), gnss()))
+
+
+@cache
+def by_cause() -> FlightResults:
+    """An unaided INS, its errors by cause."""
+    return report_example.example(causes_example.causes())
 
 
 @cache
@@ -316,6 +323,7 @@ CASES: dict[str, Callable[[], FlightResults]] = {
     "trajectory": trajectory,
     "at_rest": at_rest,
     "units": several_units,
+    "causes": by_cause,
 }
 
 
@@ -325,7 +333,7 @@ def names_of(name: str, results: FlightResults) -> list[tuple[str, ...]]:
         known = (
             one
             for one in results.figure_names
-            if not one.startswith(("gnss_", "health_", "trajectory_", "units_"))  # whose chapters draw them
+            if not one.startswith(("causes_", "gnss_", "health_", "trajectory_", "units_"))  # whose chapters draw them
             and (found := results.figure_with_rows(one)) is not None
             and "time_s" in found.columns
             and columns_by_unit(found)

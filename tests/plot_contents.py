@@ -39,6 +39,7 @@ SAVED = (
     "report",
     "aided",
     "units",
+    "causes",
     "magnetic",
     "ground",
     "flux",

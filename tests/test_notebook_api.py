@@ -46,7 +46,7 @@ NAMES = (
     "landing-deviations landing-final landing-motion landing-protection map profile attitude states gaps reference "
     "reference-track reference-claims cooperative-map cooperative-errors cooperative-geometry cooperative-links "
     "control-paths control-measures control-law placement-map placement-accuracy "
-    "units-errors units-pairs units-radial "
+    "units-errors units-pairs units-radial causes-along causes-velocity "
     "gnss-states gnss-quality gnss-standstill gnss-steps gnss-pair health-lanes health-panels "
     "trajectory-attitude trajectory-biases trajectory-map trajectory-onboard-attitude trajectory-onboard-motion "
     "trajectory-outages trajectory-residuals trajectory-separation trajectory-sigmas"

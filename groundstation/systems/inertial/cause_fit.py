@@ -60,6 +60,9 @@ STATE_OF = np.array(
 MEASURED = CHANNELS[:, [POSITION, VELOCITY]].T.ravel()  # position north, east; velocity north, east
 SLOW = CHANNELS[:, [DRIFT_RATE, RANDOM_DRIFT]].ravel()  # random at the start as later
 MOST_RESETS = 8
+# What an accelerometer is off its constant in a flight, by its random part, its scale and the bank of turns, as a share
+# of the class's bias: so large that intervals hold on simulated flights that turn (docs/inertial.md).
+IN_RUN = 0.2
 LEAST_EPOCHS = 12  # two minutes of means over ten seconds
 KEPT = kalman.KeptArrays(covariances=False, gains=False)
 ONLY_INNOVATIONS = kalman.KeptArrays(states=False, covariances=False, gains=False)
@@ -194,6 +197,8 @@ def fit_causes(differences: InsDifferences, run: ChannelsRun) -> CauseFit:
     used = flown.record.mark == USED
     white = flown.record.y[used] / np.sqrt(flown.record.S[used])[:, None]
     value, known = _least_squares(white[:, 0], white[:, 1:], root)
+    biases = [BIAS_FORWARD, BIAS_RIGHT]
+    known[biases, biases] += np.square(IN_RUN * prior_sigma[biases])
     matrices = _matrices(values[1:])
     drift_rows, tilt_rows = _equivalents(matrices, interval[1:], epochs.time_s, prior_sigma, run.model.gravity_mps2)
     end = _end_functionals(matrices[-1], run.model.radius_m, run.model.gravity_mps2, run.model.schuler_rate_radps)

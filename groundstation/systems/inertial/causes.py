@@ -166,7 +166,8 @@ def _shares(fit: CauseFit) -> tuple[CauseShare, ...]:
     found = []
     for name in CAUSES:
         row = every if name == "unexplained" else rows[name]
-        value, sigma = float(row @ fit.value), float(np.hypot(_sigma(row, fit.covariance), LEAST_SHARE))
+        least = 0.0 if name == "reset" and not fit.resets else LEAST_SHARE
+        value, sigma = float(row @ fit.value), float(np.hypot(_sigma(row, fit.covariance), least))
         found.append(CauseShare(name, _gaussian(1.0 - value if name == "unexplained" else value, sigma)))
     return tuple(found)
 
@@ -326,7 +327,11 @@ def _sentence(
     of_it = f"{100 * share.value:.0f} % ({100 * share.low95:.0f} to {100 * share.high95:.0f} %)"
     what = OF_CAUSE.get(top.name, "")
     if top.name == "schuler":
-        what = f"a Schuler oscillation of {start.value:.2g} m/s from the start, as of a tilt of {tilt.value:.2g} arcsec"
+        mrad = 1000.0 * tilt.value / ARCSEC_PER_RAD
+        what = (
+            f"a Schuler oscillation of {start.value:.2g} m/s from the start, as from a tilt of {mrad:.2g} mrad "
+            f"({tilt.value:.0f} arcsec)"
+        )
     if share.low95 > HALF:
         head = f"Most of the velocity error, {of_it}, is {what}"
     elif share.value > HALF:

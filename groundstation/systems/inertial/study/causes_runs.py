@@ -19,6 +19,7 @@ from groundstation.simulation.routes import Route, RouteKind, draw_route
 from groundstation.systems.inertial.cause_answer import CausesResult, Within95
 from groundstation.systems.inertial.cause_fit import (
     AZ,
+    AZ_DRIFT,
     BIAS_FORWARD,
     BIAS_RIGHT,
     GYRO_E,
@@ -211,7 +212,7 @@ def true_constants(flown: FlownCauses, fit: CauseFit) -> FloatArray:
     out[[PLACE_N, PLACE_E]] = flown.errors.position_m[0, row]
     out[[SPEED_N, SPEED_E]] = flown.errors.velocity_mps[0, row]
     out[[TILT_N, TILT_E]] = flown.errors.tilt_rad[0, row]
-    out[AZ] = flown.errors.azimuth_rad[0, row]
+    out[[AZ, AZ_DRIFT]] = flown.errors.azimuth_rad[0, row], flown.gyro_radps[2]
     out[[GYRO_N, GYRO_E]] = flown.gyro_radps[1], -flown.gyro_radps[0]
     out[[BIAS_FORWARD, BIAS_RIGHT]] = flown.accelerometer_mps2[:2]
     return out
