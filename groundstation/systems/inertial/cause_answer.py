@@ -106,6 +106,9 @@ class SchulerWave:
         About which it swings: - R x mean drift.
     end_mps : Within95
         Amplitude at the last comparison; what random drift added or took is in it.
+    flight_mps : Within95 or None
+        Amplitude of the plain least squares fit over the flight: offset, slope, cosine and sine; the interval is that
+        of GNSS. None of a flight shorter than a Schuler period.
     """
 
     schema_name: ClassVar[str] = "schuler_wave"
@@ -117,6 +120,7 @@ class SchulerWave:
     bias_ug: Within95
     offset_mps: Within95
     end_mps: Within95
+    flight_mps: Within95 | None = None
 
 
 @dataclass(frozen=True)
@@ -193,6 +197,9 @@ class CausesResult(Answer):
     start_mps : Within95
         Length of the Schuler amplitudes of both channels, as velocity error and tilt at the start make them;
         ``start_tilt_arcsec`` is the initial tilt that alone would.
+    period_share : float or None
+        Share of the mean square velocity error that swings with the Schuler period, whatever the cause; None of a
+        flight shorter than that.
     shares, parameters, schuler, legs, windows, along_across
         The tables.
     legs_left_out : int
@@ -221,6 +228,7 @@ class CausesResult(Answer):
     legs_left_out: int
     windows: tuple[ErrorWindow, ...]
     along_across: tuple[AlongAcross, ...]
+    period_share: float | None = None
     figures: tuple[FigureData, ...] = ()
 
     def share(self, name: Cause) -> Within95:

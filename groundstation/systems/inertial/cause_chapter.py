@@ -1,7 +1,7 @@
 """Chapter on the errors of an unaided INS by cause: shares, Schuler, body axes, legs."""
 
 from groundstation.chapters.assessed import without_answer
-from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Mark, Note, Part, Section, kept
+from groundstation.chapters.parts import Cell, Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, kept
 from groundstation.chapters.wording import ABSENT, clock, number, typeset, unit_sign
 from groundstation.results.flight import FlightResults
 from groundstation.systems.inertial.cause_answer import (
@@ -21,6 +21,16 @@ LEAD = (
     "± and ranges are 95 %."
 )
 PLACES = {"dph": 4, "ug": 0, "arcsec": 1, "deg": 3}
+SIGNS = {"ug": "µg"}
+HALF = 0.5
+WORDS = {
+    "schuler": "Schuler from the start",
+    "drift": "constant drift",
+    "azimuth": "azimuth in turns",
+    "body": "turns with the aircraft",
+    "reset": "resets",
+    "unexplained": "unexplained",
+}
 CAUSES: dict[str, tuple[str, str]] = {
     "schuler": ("Schuler oscillation from the start", "velocity error and tilt at the start"),
     "drift": ("Constant drift, north and east", "gyros and azimuth together, mean over the flight"),
@@ -47,12 +57,28 @@ def causes(results: FlightResults) -> Section | None:
         Figure("causes.along"),
         _windows(answer),
     )
-    return Section("ins_causes", TITLE, LEAD, kept(parts), _headline(answer), appendix=kept((_facts(answer),)))
+    headline = f"{CAUSES[_top(answer).name][0]}: {number(100.0 * _top(answer).share.value, 0, '%')}"
+    return Section(
+        "ins_causes",
+        TITLE,
+        LEAD,
+        kept(parts),
+        headline,
+        claim=_claim(answer, headline),
+        appendix=kept((_facts(answer),)),
+    )
 
 
-def _headline(answer: CausesResult) -> str:
-    top = max(answer.shares, key=lambda one: one.share.value)
-    return f"{CAUSES[top.name][0]}: {number(100.0 * top.share.value, 0, '%')}"
+def _top(answer: CausesResult) -> CauseShare:
+    return max(answer.shares, key=lambda one: one.share.value)
+
+
+def _claim(answer: CausesResult, headline: str) -> Claim:
+    """Return the claim: good where one cause surely has half of the error."""
+    share = _top(answer).share
+    mark = Mark("good", "Told") if share.low95 > HALF else Mark("unknown", "Not sure")
+    value = number(100.0 * share.value, 0, "%")
+    return Claim(Rank.FORECAST, mark, headline, value, WORDS[_top(answer).name], (f"{typeset(answer.sentence)}.",))
 
 
 def _one_heading(answer: CausesResult) -> Note | None:
@@ -72,7 +98,10 @@ def _within(one: Within95 | None, places: int) -> str:
 
 
 def _half(one: Measured | None, places: int) -> str:
-    return ABSENT if one is None else f"{number(one.value, places, signed=True)} ± {number(one.half95, places)}"
+    if one is None:
+        return ABSENT
+    half = f" ± {number(one.half95, places)}" if one.half95 >= 0.5 * 10.0**-places else ""
+    return f"{number(one.value, places, signed=True)}{half}"
 
 
 def _shares(answer: CausesResult) -> Grid:
@@ -100,12 +129,13 @@ def _schuler(answer: CausesResult) -> Grid:
         Head("As of a tilt, arcsec", True),
         Head("As of a bias, µg", True),
         Head("Offset, m/s", True),
-        Head("Amplitude at the end, m/s", True),
+        Head("At the end, m/s", True),
+        Head("Over the flight, m/s", True),
     )
     caption = (
         f"Velocity error = offset + amplitude cos(angle − phase), a turn in {number(answer.schuler_period_min, 1)} min "
         "from the first comparison on, by the start and the constant drift; at the end with what turns and random "
-        "drift made of it. The start alone (velocity error and tilt, both channels): "
+        "drift made of it; over the flight by plain least squares (its range is that of GNSS). The start alone (velocity error and tilt, both channels): "
         f"{_within(answer.start_mps, 2)} m/s, as of a tilt of {_within(answer.start_tilt_arcsec, 1)} arcsec. "
         "No phase: it may be any."
     )
@@ -121,6 +151,7 @@ def _wave_row(one: SchulerWave) -> tuple[Cell, ...]:
         _within(one.bias_ug, 0),
         _within(one.offset_mps, 2),
         _within(one.end_mps, 2),
+        _within(one.flight_mps, 2),
     )
 
 
@@ -136,7 +167,7 @@ def _parameters(answer: CausesResult) -> Grid:
 def _parameter_row(one: CauseParameter) -> tuple[Cell, ...]:
     places = PLACES.get(one.unit, 3)
     return (
-        f"{one.title[:1].upper()}{one.title[1:]}, {unit_sign(one.unit)}",
+        f"{one.title[:1].upper()}{one.title[1:]}, {SIGNS.get(one.unit) or unit_sign(one.unit)}",
         number(one.value, places, signed=True),
         number(one.half95, places),
         number(one.observability, 2),
@@ -159,7 +190,8 @@ def _legs(answer: CausesResult) -> Grid | None:
     more = f" {answer.legs_left_out} shorter legs are left out." if answer.legs_left_out else ""
     caption = (
         "Straight for three minutes or more; across is to the right. Growth of the position error, and change of the "
-        f"velocity error from the first to the last half minute; ± is that of GNSS.{more}"
+        "velocity error from the first to the last half minute; ± is that of GNSS, left out where it rounds to "
+        f"nothing.{more}"
     )
     return Grid("Straight legs", heads, [_leg_row(one) for one in answer.legs], caption, ("causes_along",))
 

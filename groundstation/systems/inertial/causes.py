@@ -32,6 +32,7 @@ from groundstation.systems.inertial.cause_fit import (
     fit_causes,
 )
 from groundstation.systems.inertial.cause_legs import straight_legs, track_errors
+from groundstation.systems.inertial.cause_wave import FlightWave, flight_wave
 from groundstation.systems.inertial.coupled import MPS2_PER_UG
 from groundstation.systems.inertial.differences import TRACK_MPS, InsDifferences
 from groundstation.systems.inertial.figures import ARCSEC_PER_RAD, CHANNELS, thinned
@@ -40,7 +41,7 @@ from groundstation.systems.inertial.filter import ChannelsRun
 WINDOW_HOURS = (0.5, 1.0, 2.0, 3.0)
 WINDOW_STEP_S, NEAR_S, S_PER_H = 300.0, 30.0, 3600.0
 ONE_HEADING = 0.02  # spread of headings within some 11 deg of their mean
-LEAST_SHARE = 0.005  # sigma of a share by what the columns leave out: means over ten seconds of turns, scale factors
+LEAST_SHARE = 0.01  # sigma of a share by what the columns leave out: means over ten seconds of turns, scale factors
 HALF = 0.5  # observability above which a constant counts as seen
 MOST_PHASE_DEG = 90.0
 TAIL = 0.025
@@ -77,6 +78,7 @@ def assess_causes(differences: InsDifferences, run: ChannelsRun, start_s: float 
     rng = np.random.default_rng(SEED)
     start = _amplitude(fit.start_rows @ fit.value, fit.start_rows @ fit.covariance @ fit.start_rows.T, rng)
     shares = _shares(fit)
+    wave = flight_wave(fit.time_s, fit.measured[:, 2:], fit.schuler_radps)
     parameters = _parameters(fit, is_strapdown=run.noise.is_strapdown)
     spread = heading_spread(differences)
     rows = thinned(len(run.epochs))
@@ -84,7 +86,7 @@ def assess_causes(differences: InsDifferences, run: ChannelsRun, start_s: float 
         ins_topic=differences.ins_topic,
         gnss_topic=differences.gnss_topic,
         ins_class=run.noise.name,
-        sentence=_sentence(shares, parameters, start, _tilt(fit, start)),
+        sentence=_sentence(shares, parameters, start, _tilt(fit, start), wave),
         hours=float(fit.time_s[-1] - fit.time_s[0]) / S_PER_H,
         schuler_period_min=run.model.schuler_period_min,
         heading_spread=spread,
@@ -95,11 +97,12 @@ def assess_causes(differences: InsDifferences, run: ChannelsRun, start_s: float 
         start_tilt_arcsec=_tilt(fit, start),
         shares=shares,
         parameters=parameters,
-        schuler=_schuler(fit, rng),
+        schuler=_schuler(fit, wave, rng),
         legs=legs,
         legs_left_out=left_out,
         windows=error_windows(run, position, start_s),
         along_across=track.rms(),
+        period_share=None if wave is None else wave.share,
         figures=(
             _over_time(fit),
             CausesAlong(
@@ -221,7 +224,7 @@ def _parameters(fit: CauseFit, *, is_strapdown: bool) -> tuple[CauseParameter, .
     return tuple(found)
 
 
-def _schuler(fit: CauseFit, rng: np.random.Generator) -> tuple[SchulerWave, ...]:
+def _schuler(fit: CauseFit, wave: FlightWave | None, rng: np.random.Generator) -> tuple[SchulerWave, ...]:
     start, end = fit.schuler_rows, fit.end_rows
     last = fit.end_offset + end @ fit.value
     last_covariance = fit.end_covariance + end @ fit.covariance @ end.T
@@ -240,6 +243,7 @@ def _schuler(fit: CauseFit, rng: np.random.Generator) -> tuple[SchulerWave, ...]
                 bias_ug=_scaled(amplitude, fit.schuler_radps / MPS2_PER_UG),
                 offset_mps=_gaussian(float(drift @ fit.value), _sigma(drift, fit.covariance)),
                 end_mps=_amplitude(last[use], last_covariance[use, use], rng),
+                flight_mps=None if wave is None else wave.amplitude_mps[channel],
             )
         )
     return tuple(found)
@@ -320,7 +324,11 @@ def _over_time(fit: CauseFit) -> CausesOverTime:
 
 
 def _sentence(
-    shares: tuple[CauseShare, ...], parameters: tuple[CauseParameter, ...], start: Within95, tilt: Within95
+    shares: tuple[CauseShare, ...],
+    parameters: tuple[CauseParameter, ...],
+    start: Within95,
+    tilt: Within95,
+    wave: FlightWave | None,
 ) -> str:
     top = max(shares, key=lambda one: one.share.value)
     share = top.share
@@ -342,4 +350,5 @@ def _sentence(
     told = ", ".join(
         f"{one.name.removeprefix('mean_drift_')} {one.value:+.4f} ± {one.half95:.4f} deg/h" for one in drifts
     )
-    return f"{head}; drift {told}" if told else head
+    swings = "" if wave is None else f"; {100 * wave.share:.0f} % of it swings with the Schuler period"
+    return f"{head}{swings}; drift {told}" if told else f"{head}{swings}"

@@ -34,6 +34,7 @@ from groundstation.systems.inertial.cause_fit import (
     fit_causes,
 )
 from groundstation.systems.inertial.cause_legs import straight_legs
+from groundstation.systems.inertial.cause_wave import flight_wave
 from groundstation.systems.inertial.causes import CauseRow, assess_causes, parameter_rows, share_rows
 from groundstation.systems.inertial.coupled import AZIMUTH, CHANNELS, FORWARD_BIAS, RIGHT_BIAS, SIZE
 from groundstation.systems.inertial.differences import InsDifferences, drag_per_s
@@ -236,8 +237,7 @@ def _cells(flown: FlownCauses, answer: CausesResult, fit: CauseFit) -> Iterator[
     rows = {one.name: one for one in parameter_rows(fit, is_strapdown=answer.is_strapdown)}
     for one in answer.parameters:
         yield _of_half(one.name, one.value - _applied(rows[one.name], true), one.half95)
-    at = np.searchsorted(flown.route.motion.time_s, fit.time_s)
-    explained = share_rows(fit, flown.errors.velocity_mps[0, np.minimum(at, len(flown.route.motion.time_s) - 1)])
+    explained = share_rows(fit, _true_means(flown, fit))
     shares = {name: float(row @ true) for name, row in explained.items()}
     shares["unexplained"] = 1.0 - sum(shares.values())
     for share in answer.shares:
@@ -245,7 +245,10 @@ def _cells(flown: FlownCauses, answer: CausesResult, fit: CauseFit) -> Iterator[
             yield _of(f"share {share.name}", share.share, shares[share.name])
     yield _of("start amplitude", answer.start_mps, float(np.linalg.norm(fit.start_rows @ true)))
     start, end = fit.schuler_rows @ true, fit.end_states @ _true_end(flown, fit)
+    flown_mps = flight_wave(fit.time_s, _true_means(flown, fit), fit.schuler_radps)
     for place, wave in enumerate(answer.schuler):
+        if wave.flight_mps is not None and flown_mps is not None:
+            yield _of("amplitude over the flight", wave.flight_mps, flown_mps.amplitude_mps[place].value)
         a, b = start[2 * place : 2 * place + 2]
         yield _of("amplitude", wave.amplitude_mps, float(np.hypot(a, b)))
         yield _of("amplitude at the end", wave.end_mps, float(np.hypot(*end[2 * place : 2 * place + 2])))
@@ -256,6 +259,12 @@ def _cells(flown: FlownCauses, answer: CausesResult, fit: CauseFit) -> Iterator[
             apart = float(wrap_180(np.rad2deg(np.arctan2(b, a)) - middle))
             yield CauseCell("phase", -apart, phase.low95 - middle - apart, phase.high95 - middle - apart)
     yield from _legs(flown, answer)
+
+
+def _true_means(flown: FlownCauses, fit: CauseFit) -> FloatArray:
+    """Return the velocity errors at the epochs of a fit, shape (n, 2)."""
+    time_s = flown.route.motion.time_s
+    return np.stack([np.interp(fit.time_s, time_s, part) for part in flown.errors.velocity_mps[0].T], axis=1)
 
 
 def _legs(flown: FlownCauses, answer: CausesResult) -> Iterator[CauseCell]:
