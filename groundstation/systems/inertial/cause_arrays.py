@@ -24,7 +24,7 @@ class CausesOverTime(Arrays, figure="causes_over_time", digits={"time_s": 1, "*_
 
 
 class CausesAlong(Arrays, figure="causes_along", digits={"time_s": 1, "*_mps": 4, "*_m": 1}):
-    """Errors along and across (to the right of) the track; NaN where the aircraft hardly moves."""
+    """Errors along the track and to its right; NaN where the aircraft hardly moves."""
 
     time_s: Floats
     along_mps: Floats

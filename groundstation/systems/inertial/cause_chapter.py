@@ -135,7 +135,8 @@ def _schuler(answer: CausesResult) -> Grid:
     caption = (
         f"Velocity error = offset + amplitude cos(angle − phase), a turn in {number(answer.schuler_period_min, 1)} min "
         "from the first comparison on, by the start and the constant drift; at the end with what turns and random "
-        "drift made of it; over the flight by plain least squares (its range is that of GNSS). The start alone (velocity error and tilt, both channels): "
+        "drift made of it; over the flight by plain least squares (its range is that of GNSS). The start alone "
+        "(velocity error and tilt, both channels): "
         f"{_within(answer.start_mps, 2)} m/s, as of a tilt of {_within(answer.start_tilt_arcsec, 1)} arcsec. "
         "No phase: it may be any."
     )

@@ -1,4 +1,4 @@
-"""Constants of an INS fitted over a whole flight, under the random drift of the coupled model.
+"""Constants of an INS fitted over a whole flight, under the model's random drift.
 
 The error of an unaided INS is what its start, its constants and its resets make of it, plus what white noise and random
 drift add. The first is linear in the constants: its columns are the coupled model's own responses along the flight.
@@ -133,7 +133,7 @@ class CauseFit:
         return rows
 
     def parts(self) -> dict[str, FloatArray]:
-        """Return what a unit of each constant adds to the velocity error, by cause, shapes (n, 2, p).
+        """Return velocity errors by a unit of each constant, by cause, shapes (n, 2, p).
 
         Constants that act alike before any turn are one cause: a bias is a tilt at the start and azimuth or a gyro a
         mean drift; only what differs from these is theirs.
@@ -287,7 +287,7 @@ def _responses(
 def _prior(
     covariance: FloatArray, noise: InsNoise, epochs: DifferenceEpochs, resets: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a root (p, p) of the covariance of the constants before the flight, and its sigmas (p,).
+    """Return a root (p, p) of the covariance before the flight, and its sigmas (p,).
 
     Beside the coupled model's own: a drift that stays north and east, of the class's size, where gyros turn with the
     body; jumps of a reset, of which nothing is known.
@@ -306,7 +306,7 @@ def _prior(
 
 
 def _least_squares(z: FloatArray, columns: FloatArray, root: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return constants and their covariance from whitened measurements (m,) and columns (m, p)."""
+    """Return constants and covariance from whitened measurements (m,), columns (m, p)."""
     rows = columns @ root
     inverse = np.linalg.inv(rows.T @ rows + np.eye(root.shape[1]))
     covariance = root @ inverse @ root.T

@@ -48,7 +48,7 @@ class TrackErrors:
 
 
 def along_track(vectors: FloatArray, course_rad: FloatArray | float) -> FloatArray:
-    """Return the parts of vectors north-east (n, 2) along a course and to the right of it, (n, 2).
+    """Return vectors (n, 2) north-east as parts along a course and to its right, (n, 2).
 
     Examples
     --------
@@ -72,7 +72,7 @@ def track_errors(differences: InsDifferences, position_m: FloatArray, velocity_m
 def straight_legs(
     differences: InsDifferences, position_m: FloatArray, velocity_mps: FloatArray
 ) -> tuple[tuple[StraightLeg, ...], int]:
-    """Return the longest straight legs in the order of time, and how many shorter ones are left out.
+    """Return the longest straight legs in the order of time, and the count of those left out.
 
     Parameters
     ----------

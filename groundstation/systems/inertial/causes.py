@@ -1,4 +1,4 @@
-"""Errors of an unaided INS by cause: shares, Schuler oscillation, constants, legs, windows."""
+"""Errors of an unaided INS by cause: shares, Schuler, constants, legs, windows."""
 
 from typing import NamedTuple
 
@@ -154,7 +154,7 @@ def _tilt(fit: CauseFit, amplitude: Within95) -> Within95:
 
 
 def share_rows(fit: CauseFit, velocity_mps: FloatArray) -> dict[str, FloatArray]:
-    """Return the share of each cause but the last in a mean square velocity error (n, 2), as rows (p,).
+    """Return shares of causes in a mean square velocity error (n, 2), as rows (p,).
 
     A share is the mean of part x error over the mean of error x error: linear in the constants.
     """
@@ -260,7 +260,7 @@ def _phase(draws: FloatArray) -> Within95 | None:
 
 
 def error_windows(run: ChannelsRun, position_m: FloatArray, start_s: float | None) -> tuple[ErrorWindow, ...]:
-    """Return the radial error after some hours: of the flight, and of all windows of this length.
+    """Return the radial error after some hours: of the flight, and of all its windows.
 
     Parameters
     ----------

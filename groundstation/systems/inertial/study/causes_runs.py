@@ -55,7 +55,7 @@ GRAVITY_ARCSEC, GRAVITY_KM = 20.0, 100.0  # deflection over mountains
 
 @dataclass(frozen=True)
 class CauseCase:
-    """Flights of one cell: class, route, whether each has an instrument of its own, what is broken."""
+    """Flights of one cell: class, route, instruments of their own or not, what is broken."""
 
     name: str
     ins: str
@@ -81,7 +81,7 @@ CASES: tuple[CauseCase, ...] = (
 
 @dataclass(frozen=True)
 class CauseCell:
-    """One value of the answer against the truth: error, and the ends of its interval less the truth."""
+    """Value of the answer against the truth: error, and the ends of its interval."""
 
     quantity: str
     error: float
