@@ -141,7 +141,7 @@ class CauseFit:
         speed = self.response[:, CHANNELS[:, VELOCITY]]
         by_tilt = np.einsum("nct,tp->ncp", speed[:, :, [TILT_N, TILT_E]], self.tilt_rows)
         by_drift = np.einsum("nct,tp->ncp", speed[:, :, [DRIFT_N, DRIFT_E]], self.drift_rows)
-        whole = {name: np.zeros_like(speed) for name in CAUSES[:-1]}
+        whole: dict[str, FloatArray] = {name: np.zeros_like(speed) for name in CAUSES[:-1]}
         start = [PLACE_N, PLACE_E, SPEED_N, SPEED_E]
         whole["schuler"][:, :, start] = speed[:, :, start]
         whole["schuler"] += by_tilt

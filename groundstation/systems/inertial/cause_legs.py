@@ -104,7 +104,7 @@ def _is_straight(differences: InsDifferences) -> BoolArray:
         return known
     course = np.interp(time_s, time_s[known], np.unwrap(track[known]))
     turned = np.interp(time_s + OVER_S, time_s, course) - np.interp(time_s - OVER_S, time_s, course)
-    return known & (np.abs(turned) < np.deg2rad(TURN_DPS) * 2.0 * OVER_S)
+    return np.asarray(known & (np.abs(turned) < np.deg2rad(TURN_DPS) * 2.0 * OVER_S))
 
 
 def _leg(differences: InsDifferences, use: slice, position_m: FloatArray, velocity_mps: FloatArray) -> StraightLeg:
@@ -116,13 +116,16 @@ def _leg(differences: InsDifferences, use: slice, position_m: FloatArray, veloci
     rates = _change(time_s, along_track(position_m[use], course_rad), is_position=True)
     changes = _change(time_s, along_track(velocity_mps[use], course_rad), is_position=False)
     nmiph = S_PER_H / M_PER_NAUTICAL_MILE / max(float(time_s[-1] - time_s[0]) - END_S, 1.0)
+    along, across = (None if one is None else Measured(one.value * nmiph, one.half95 * nmiph) for one in rates)
     return StraightLeg(
-        float(time_s[0]),
-        float(time_s[-1]),
-        float(wrap_360(np.rad2deg(course_rad))),
-        length_m / 1000.0,
-        *(None if one is None else Measured(one.value * nmiph, one.half95 * nmiph) for one in rates),
-        *changes,
+        start_s=float(time_s[0]),
+        end_s=float(time_s[-1]),
+        course_deg=float(wrap_360(np.rad2deg(course_rad))),
+        length_km=length_m / 1000.0,
+        along_rate_nmiph=along,
+        across_rate_nmiph=across,
+        along_change_mps=changes[0],
+        across_change_mps=changes[1],
     )
 
 

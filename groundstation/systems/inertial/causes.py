@@ -350,5 +350,5 @@ def _sentence(
     told = ", ".join(
         f"{one.name.removeprefix('mean_drift_')} {one.value:+.4f} ± {one.half95:.4f} deg/h" for one in drifts
     )
-    swings = "" if wave is None else f"; {100 * wave.share:.0f} % of it swings with the Schuler period"
+    swings = "" if wave is None else f"; in all {100 * wave.share:.0f} % of the error swings with the Schuler period"
     return f"{head}{swings}; drift {told}" if told else f"{head}{swings}"
