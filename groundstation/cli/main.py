@@ -218,6 +218,14 @@ def report(
             help="With --standard: exit 4 if it is failed (fail), or also if flights are too few to pass (warn).",
         ),
     ] = "none",
+    unit_limits: Annotated[
+        Path | None,
+        typer.Option(
+            "--unit-limits",
+            help="Rates at which INS units are to be calibrated (TOML); kept in OUT for later runs.",
+            metavar="FILE",
+        ),
+    ] = None,
     pdf: Pdf = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -230,13 +238,15 @@ def report(
     from groundstation.cli import printing
     from groundstation.cli.text import printable
 
+    if standard and unit_limits is not None:
+        raise UsageError("report", "--unit-limits with --standard", "one of them")
     if standard:
         return fleets.acceptance(out, standard, output, fail_on, quiet=quiet, json=json)
     if output is not None or fail_on != "none":
         raise UsageError("report", "-o or --fail-on without --standard", "--standard NAME too")
     from groundstation.pipeline.many_flights.fleet.publishing import report_again
 
-    done = report_again(out, with_pdf=pdf)
+    done = report_again(out, with_pdf=pdf, limits=unit_limits)
     tell_written(done.written, as_json_text=json, quiet=quiet)
     if done.removed and not quiet:
         say(printable(printing.removed(done.removed)))

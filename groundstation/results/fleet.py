@@ -14,6 +14,7 @@ from groundstation.base.serial import to_json
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.results.arrays.fleet import FleetChecks, FleetInstallationFlights, FleetSkillFlights, FleetTrend
 from groundstation.results.figures import FigureData
+from groundstation.results.fleet_units import FleetUnitFlights, FleetUnitRow, UnitEventRow, UnitTrendRow
 from groundstation.results.frames import row_fields, rows_frame
 from groundstation.results.installations import InstallationRow
 from groundstation.results.roles import LETTERS
@@ -327,6 +328,14 @@ class FleetResults:
         By serial and time.
     installation_flights : FleetInstallationFlights
         A row for each flight of them: what earlier ones had taught, its learned answer, its residual.
+    units : tuple of FleetUnitRow
+        Every INS by its serial.
+    unit_trends : tuple of UnitTrendRow
+        Their figures over time, by serial.
+    unit_events : tuple of UnitEventRow
+        Moves, changes of level, pauses, doubts.
+    unit_flights : FleetUnitFlights
+        Every INS of every flight.
     """
 
     flights: FigureData
@@ -346,6 +355,10 @@ class FleetResults:
     sessions: tuple[SessionRow, ...] = ()
     installations: tuple[InstallationRow, ...] = ()
     installation_flights: FleetInstallationFlights = field(default_factory=FleetInstallationFlights.empty)
+    units: tuple[FleetUnitRow, ...] = ()
+    unit_trends: tuple[UnitTrendRow, ...] = ()
+    unit_events: tuple[UnitEventRow, ...] = ()
+    unit_flights: FleetUnitFlights = field(default_factory=FleetUnitFlights.empty)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "stated", MappingProxyType(dict(self.stated)))

@@ -7,6 +7,8 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from groundstation.results.fleet_units import UnitOfFlight
+
 NORMAL_95 = 1.959964
 LARGEST = 1e15  # no figure of a flight is larger: what is comes from a file that is damaged
 
@@ -69,12 +71,15 @@ class SystemShare:
         The shipped method of the forecast, and the skill of each.
     checks : sequence of Check
         Comparisons of its answers with something independent.
+    units : sequence of UnitOfFlight
+        What each INS adds to the history of its unit.
     """
 
     samples: FleetSamples | None = None
     shipped: str = ""
     skill: Sequence[SkillOfFlight] = ()
     checks: Sequence[Check] = ()
+    units: Sequence[UnitOfFlight] = ()
 
 
 def to_number(value: Any) -> float:

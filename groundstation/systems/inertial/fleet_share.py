@@ -1,18 +1,19 @@
-"""Share of a flight in the fleet that the forecast adds: its skill by method and horizon."""
+"""Share of a flight in the fleet: skill of the forecast, and figures of each INS."""
 
 import math
 
 from groundstation.results.files import SavedFlight
 from groundstation.results.fleet_share import SkillOfFlight, SystemShare, to_number
+from groundstation.systems.inertial.fleet_units_share import units_of
 from groundstation.systems.inertial.forecast_answer import TOO_FEW, WITHIN, CalibrationRow, ForecastResult, honesty
 from groundstation.systems.system import InFleet
 
 
 def share_of(saved: SavedFlight) -> SystemShare:
-    """Return the shipped method of a flight and its rows of forecast skill."""
-    forecast = saved.results.answer(ForecastResult)
+    """Return the forecast skill of a flight, its shipped method and its INS units."""
+    forecast, units = saved.results.answer(ForecastResult), units_of(saved)
     if forecast is None:
-        return SystemShare()
+        return SystemShare(units=units)
     told = {(row.method, row.horizon_min): _is_within(row) for row in forecast.calibration}
     rows = [
         SkillOfFlight(
@@ -22,7 +23,7 @@ def share_of(saved: SavedFlight) -> SystemShare:
         for row in forecast.skill
         if row.starts >= 1 and math.isfinite(to_number(row.horizon_min) + to_number(row.rms_m))
     ]
-    return SystemShare(shipped=forecast.default_method, skill=rows)
+    return SystemShare(shipped=forecast.default_method, skill=rows, units=units)
 
 
 def _is_within(row: CalibrationRow) -> bool | None:

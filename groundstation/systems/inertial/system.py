@@ -37,9 +37,11 @@ def _fleet_chapters() -> "tuple[FleetChapter, ...]":
     from groundstation.chapters.fleet.chapter import FleetChapter
     from groundstation.systems.inertial import fleet_chapter as skill
     from groundstation.systems.inertial import fleet_drift_chapter as drift
+    from groundstation.systems.inertial import fleet_units_chapter as units
 
     return (
         FleetChapter("ins", 600, drift.build, figures=drift.figures),
+        FleetChapter("units", 620, units.build, figures=units.figures),
         FleetChapter("skill", 650, skill.build, figures=skill.figures),
     )
 
@@ -47,14 +49,16 @@ def _fleet_chapters() -> "tuple[FleetChapter, ...]":
 def _fleet_plots() -> "Mapping[str, Describe]":
     from groundstation.systems.inertial import fleet_plots as skill
     from groundstation.systems.inertial.fleet_drift_plots import rates
+    from groundstation.systems.inertial.fleet_units_plots import over_dates
 
-    return {"fleet.rates": rates, "fleet.growth": skill.growth, "fleet.skill": skill.flights}
+    return {"fleet.rates": rates, "fleet.growth": skill.growth, "fleet.skill": skill.flights, "fleet.units": over_dates}
 
 
 def _fleet_tabs() -> tuple[FleetTab, ...]:
     from groundstation.systems.inertial.fleet_tab import forecast
+    from groundstation.systems.inertial.fleet_units_tab import units
 
-    return (FleetTab("forecast", forecast),)
+    return (FleetTab("units", units), FleetTab("forecast", forecast))
 
 
 def _in_fleet() -> InFleet:

@@ -6,13 +6,14 @@ Every flight has some columns; between them stand those that each analysis gives
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from groundstation.methods.fleet.density import SampleHistogram
 from groundstation.reports.index import IndexRow
 from groundstation.results.columns import FlightColumn
 from groundstation.results.fleet_share import Check, SkillOfFlight
+from groundstation.results.fleet_units import UnitOfFlight
 from groundstation.results.flight import FlightResults
 from groundstation.results.installations import Lesson
 from groundstation.systems import systems
@@ -64,11 +65,13 @@ CHECK_FIELDS = {
     "sigma_deg": "double",
     "verdict": "string",
 }  # of Check
+UNIT_FIELDS = {one.name: "string" if one.type is str else "double" for one in fields(UnitOfFlight)}
 DETAILS = {
     "index": "JSON: the flight's row of index.json",
     "shipped": "the shipped method of the forecast",
     "skill": "forecast skill of each method and horizon",
     "checks": "what independent thing each estimate was compared with",
+    "units": "figures of each INS by its serial, or why they do not count",
     "sample_cell": "cells of 0.01 deg that hold used heading samples",
     "sample_count": "how many samples each of them holds",
     "lesson": "JSON: what the flight says of the installation of its INS; empty without a serial",
@@ -101,6 +104,8 @@ class FlightShare:
         Digests of its consecutive logs but the first.
     lesson : Lesson, optional
         What it says of the installation of its INS; None where it states no serial.
+    units : sequence of UnitOfFlight
+        What each INS adds to the history of its unit.
     """
 
     row: Mapping[str, Any]
@@ -115,6 +120,7 @@ class FlightShare:
     samples: str
     parts: tuple[str, ...] = ()
     lesson: Lesson | None = None
+    units: Sequence[UnitOfFlight] = ()
 
 
 def dataset_schema() -> Any:
@@ -136,6 +142,7 @@ def dataset_schema() -> Any:
     lists = {
         "skill": _rows_of(SKILL_FIELDS),
         "checks": _rows_of(CHECK_FIELDS),
+        "units": _rows_of(UNIT_FIELDS),
         "sample_cell": cells,
         "sample_count": cells,
     }

@@ -13,6 +13,7 @@ from groundstation.pipeline.many_flights.fleet.refresh import forget_month, refr
 from groundstation.pipeline.many_flights.fleet.samples import SAMPLES
 from groundstation.pipeline.many_flights.fleet.scan import FLIGHTS, DamagedMonthError, Scan
 from groundstation.pipeline.many_flights.fleet.statistics import FLEET_PARQUET, write_fleet
+from groundstation.pipeline.many_flights.fleet.unit_files import UNIT_FLIGHTS_CSV, UNITS_CSV, keep_limits
 from groundstation.pipeline.many_flights.inputs import (
     FLIGHT_FOLDER_MARK,
     flight_folders,
@@ -34,6 +35,7 @@ from groundstation.systems import systems
 FLEET_RECORDING = "fleet.rrd"
 FLEET_FILES = (
     *(INDEX_JSON, INDEX_CSV, FLEET_PARQUET, FLIGHTS, SAMPLES, INSTALLATIONS),
+    *(UNITS_CSV, UNIT_FLIGHTS_CSV),
     *(FLEET_RECORDING, FLEET_PAGE, FLEET_PDF),
 )
 
@@ -131,21 +133,28 @@ class ReportedAgain(NamedTuple):
     removed: list[Path]
 
 
-def report_again(out: Path, *, with_pdf: bool = False) -> ReportedAgain:
+def report_again(out: Path, *, with_pdf: bool = False, limits: Path | None = None) -> ReportedAgain:
     """Make reports and index of an OUT again from the saved results.
 
-    Of one flight folder, its report alone is made.
+    Of one flight folder, its report alone is made. ``limits`` is a file of limits for the INS units, which is kept in
+    the folder.
 
     Raises
     ------
     UsageError
-        When the folder is not one that ``run`` made.
+        When the folder is not one that ``run`` made, or limits are given with one flight.
+    SettingsError
+        For a file of limits that cannot be used.
     """
     from groundstation.reports.flight_report import PDF, write_flight_report
 
     is_flight = (out / FLIGHT_FOLDER_MARK).is_file()
     if not is_flight and (not out.is_dir() or not (is_ours(out) or flight_folders(out))):
         raise UsageError(str(out), "no results", "a folder that `run` made")
+    if limits is not None:
+        if is_flight:
+            raise UsageError(str(out), "--unit-limits with one flight", "a folder of flights")
+        keep_limits(out, limits)
     paths: list[Path] = []
     problems: list[Outcome] = []
     folders = [out] if is_flight else [*flight_folders(out), *session_folders(out), *plan_folders(out)]

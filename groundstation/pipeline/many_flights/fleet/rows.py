@@ -115,6 +115,7 @@ def share_of(folder: Path, store: SampleStore | None = None) -> FlightShare:
         store.put(row, samples) if samples is not None and store is not None else "",
         tuple(part.sha256 for part in saved.manifest.parts[1:]),
         lesson_of(saved),
+        [unit for one in shares for unit in one.units],
     )
 
 

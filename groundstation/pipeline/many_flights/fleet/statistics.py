@@ -17,6 +17,7 @@ from groundstation.methods.fleet.deviation import deviations
 from groundstation.methods.fleet.installations import installation_flights, installation_rows
 from groundstation.methods.fleet.moments import Moments
 from groundstation.methods.fleet.skill import SkillMerger
+from groundstation.methods.fleet.units import FlownUnit, UnitHistories, histories_of
 from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS
 from groundstation.pipeline.many_flights.fleet.rows import session_row, share_of
 from groundstation.pipeline.many_flights.fleet.scan import MOST_LISTED, Scan, scan
@@ -27,7 +28,9 @@ from groundstation.pipeline.many_flights.fleet.table import (
     histograms_of,
     skill_rows_of,
     to_arrow,
+    units_of,
 )
+from groundstation.pipeline.many_flights.fleet.unit_files import limits_in, write_units
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.arrays.fleet import FleetChecks, FleetSkillFlights
 from groundstation.results.figures import FigureData
@@ -114,7 +117,8 @@ def write_fleet(out: Path, found: Scan) -> tuple[FleetResults, tuple[Outcome, ..
         problems = (Outcome(str(out), "failed", problem, is_beside=True),)
     flights = flights_of(table)
     del table
-    return _results(found, flights, shares, unread), problems
+    results = _results(found, flights, shares, unread)
+    return results, (*problems, *write_units(out, results))
 
 
 def _unread_shares(found: Scan) -> tuple[Any, list[NotInFleet]]:
@@ -164,6 +168,7 @@ def _results(found: Scan, flights: FigureData, shares: Any, unread: list[NotInFl
     histograms = compress(chain.from_iterable(map(histograms_of, cells)), is_sampled.tolist())
     trend, changes = answer.trends(flights, settings)
     merger, skill_flights, checks = _details(found, flights, shares)
+    units = _units(found, flights, shares)
     read = installations_in(found.out)
     installations = () if read is None else read.installations
     sessions: list[SessionRow] = []
@@ -190,7 +195,31 @@ def _results(found: Scan, flights: FigureData, shares: Any, unread: list[NotInFl
         stated=answer.stated_rates(settings),
         installations=installation_rows(installations),
         installation_flights=installation_flights(installations),
+        units=units.rows,
+        unit_trends=units.trends,
+        unit_events=units.events,
+        unit_flights=units.flights,
     )
+
+
+def _units(found: Scan, flights: FigureData, shares: Any) -> UnitHistories:
+    """Histories of the INS units, by the limits that stand in the folder."""
+    starts = flights["start_utc"].astype("datetime64[ns]")
+    known = ~np.isnat(starts)
+    start_ns, length_s = starts.astype(np.int64), flights["duration_s"]
+    every = chain.from_iterable(map(units_of, _parts(found, shares, ("units",))))
+    flown = [
+        FlownUnit(
+            unit,
+            str(flights["flight_id"][row]),
+            str(flights["aircraft"][row]),
+            int(start_ns[row]) if known[row] else None,
+            int(start_ns[row] + 1e9 * length_s[row]) if known[row] and np.isfinite(length_s[row]) else None,
+        )
+        for row, own in enumerate(every)
+        for unit in own
+    ]
+    return histories_of(flown, limits_in(found.out))
 
 
 def _details(found: Scan, flights: FigureData, shares: Any) -> tuple[SkillMerger, FleetSkillFlights, FleetChecks]:

@@ -17,6 +17,7 @@ from groundstation.reports.index import IndexRow
 from groundstation.results.columns import READ_BY_FLEETS, FlightColumn
 from groundstation.results.figures import FigureData
 from groundstation.results.files import parquet_bytes, utf8_text
+from groundstation.results.fleet_units import UnitOfFlight
 from groundstation.results.installations import Lesson
 
 MOST_WIDE_CHARACTERS = 10_000_000  # of a column of texts as wide as its longest; beyond it each is an object
@@ -30,7 +31,7 @@ def to_arrow(shares: Sequence[FlightShare]) -> Any:
     arrays = {column.name: _arrow(column, [share.row[column.name] for share in shares]) for column in FLIGHT_COLUMNS}
     arrays["index"] = pa.array([_json(to_json_exactly(share.index)) for share in shares], pa.string())
     arrays["shipped"] = pa.array([utf8_text(share.shipped) for share in shares], pa.string())
-    for name in ("skill", "checks"):
+    for name in ("skill", "checks", "units"):
         rows = [list(map(_finite, getattr(share, name))) for share in shares]
         arrays[name] = pa.array(rows, schema.field(name).type)
     for name, part in (("sample_cell", "cell"), ("sample_count", "count")):
@@ -81,6 +82,12 @@ def check_rows_of(table: Any) -> tuple[NDArray[np.intp], dict[str, NDArray[Any]]
     """The checks of all flights in a table of shares: the row of the flight, and columns."""
     rows, parts = _flat(table.column("checks"))
     return rows, {name: _values(array, math.nan) for name, array in parts.items()}
+
+
+def units_of(table: Any) -> Iterator[list[UnitOfFlight]]:
+    """Units of each flight in a table of shares."""
+    for rows in table.column("units").to_pylist():
+        yield [UnitOfFlight(**{name: value for name, value in row.items() if value is not None}) for row in rows or ()]
 
 
 def _flat(column: Any) -> tuple[NDArray[np.intp], dict[str, Any]]:
