@@ -24,7 +24,7 @@ from groundstation.systems.trajectory.claim_chapter import (
     wrong_texts,
 )
 from groundstation.systems.trajectory.onboard_answer import OnboardError, OnboardErrors
-from groundstation.systems.trajectory.quantity_answer import UNITS, Quantity
+from groundstation.systems.trajectory.quantity_answer import SURE_DEG, UNITS, Quantity
 from groundstation.systems.trajectory.wording_answer import (
     sentence_of,
     when,
@@ -167,6 +167,7 @@ def _onboard(answer: BestTrajectory) -> Grid | None:
     if answer.onboard.delay_s is not None and answer.onboard.delay_sigma_s is not None:
         delay = with_half(answer.onboard.delay_s, 1.96 * answer.onboard.delay_sigma_s, "s")
         caption += f" Its stamps are later than those of the inertial unit by {typeset(delay)}; that is taken off."
+    caption += _judged(answer.onboard)
     if not is_sure:
         caption += " Spans are not told: the sigmas are not sure enough to blame the filter."
     if answer.onboard.flew is not None:
@@ -180,6 +181,12 @@ def _onboard(answer: BestTrajectory) -> Grid | None:
         )
     title = f"Errors of the on-board filter ({answer.onboard.title})"
     return Grid(title, heads, rows, caption, ("trajectory_onboard",))
+
+
+def _judged(of: OnboardErrors) -> str:
+    """Return the share of the time in which ours was sure enough to judge an angle."""
+    told = [f"{one.quantity} {percent(one.judged_share)}" for one in of.rows if one.judged_share < 0.995]
+    return f" Judged only where ours is known to {SURE_DEG:g}° (σ): {', '.join(told)} of the time." if told else ""
 
 
 def _every_filter(answer: BestTrajectory) -> Grid | None:

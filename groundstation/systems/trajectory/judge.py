@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.quantiles import NORMAL_95
+from groundstation.base.records import BoolArray
 from groundstation.systems.trajectory.checks_answer import AgainstOwnTrack, OutageRow, RaisedSigma
 from groundstation.systems.trajectory.outages import LENGTHS_S, Outages
 from groundstation.systems.trajectory.solution import FloatArray, TrackOfStates
@@ -26,15 +27,17 @@ class Factors:
     height: float = 1.0
 
 
-def position_factor(outages: Outages, ratio: FloatArray) -> float:
+def position_factor(outages: Outages, ratio: FloatArray, *, is_horizontal: bool) -> float:
     """Return the factor that puts 95 % of all outages inside.
 
-    Of each length that has ten it puts 90 % inside.
+    Of each length that has ten it puts 90 % inside, and the RMS error at most at the RMS sigma.
 
     Parameters
     ----------
     ratio : ndarray, shape (n,)
         Error of each outage over its 95 % bound.
+    is_horizontal : bool
+        The ratio is that of the horizontal error, whose RMS counts too.
     """
     if len(outages) < FEW:
         return 1.0
@@ -43,7 +46,13 @@ def position_factor(outages: Outages, ratio: FloatArray) -> float:
         of = ratio[outages.of_length(length_s)]
         if len(of) >= 2 * FEW:
             factor = max(factor, _quantile(of, LEAST_WANTED))
+            if is_horizontal:
+                factor = max(factor, _rms_over_sigma(outages, outages.of_length(length_s)))
     return factor
+
+
+def _rms_over_sigma(outages: Outages, of: BoolArray) -> float:
+    return float(np.sqrt(np.mean(outages.error_m[of] ** 2) / np.mean(outages.sigma_m[of] ** 2)))
 
 
 def _quantile(values: FloatArray, share: float) -> float:
@@ -61,8 +70,8 @@ def raised(
     heading_sigma_deg : float
         Median of the sigma on straights, as the filter has it.
     """
-    position = position_factor(outages, outages.ratio)
-    height = max(position, position_factor(outages, outages.down_ratio))
+    position = position_factor(outages, outages.ratio, is_horizontal=True)
+    height = max(position, position_factor(outages, outages.down_ratio, is_horizontal=False))
     velocity = tilt = heading = 1.0
     why_tilt = why_heading = ""
     if len(outages) >= FEW:
@@ -84,11 +93,8 @@ def raised(
                 f"heading minus own track scatters by {own.scatter_100_s_deg:.2f} deg over 100 s "
                 f"where {heading_sigma_deg:.2f} was expected"
             )
-    inside = np.mean(outages.ratio <= 1.0) if len(outages) else 1.0
     rows = (
-        RaisedSigma(
-            "position", position, f"{inside:.0%} of {len(outages)} replayed outages inside 95 %" if position > 1 else ""
-        ),
+        RaisedSigma("position", position, _why_position(outages) if position > 1 else ""),
         RaisedSigma(
             "height",
             height,
@@ -105,6 +111,13 @@ def raised(
         RaisedSigma("heading", heading, why_heading if heading > 1 else ""),
     )
     return Factors(position, velocity, tilt, heading, height), rows
+
+
+def _why_position(outages: Outages) -> str:
+    inside = f"{np.mean(outages.ratio <= 1.0):.0%} of {len(outages)} replayed outages inside 95 %"
+    many = [one for one in LENGTHS_S if outages.of_length(one).sum() >= 2 * FEW]
+    share, length_s = max(((_rms_over_sigma(outages, outages.of_length(one)), one) for one in many), default=(0.0, 0.0))
+    return f"{inside}; RMS error of {length_s:g} s {share:.2f} times its sigma" if share > 1.0 else inside
 
 
 def with_factors(track: TrackOfStates, factors: Factors, constant_m: FloatArray) -> TrackOfStates:
@@ -133,7 +146,6 @@ def outage_rows(outages: Outages, factor: float, height: float) -> tuple[OutageR
         if not of.any():
             continue
         error = float(np.sqrt(np.mean(outages.error_m[of] ** 2)))
-        sigma = factor * float(np.sqrt(np.mean(outages.sigma_m[of] ** 2)))
         rows.append(
             OutageRow(
                 length_s,
@@ -141,7 +153,7 @@ def outage_rows(outages: Outages, factor: float, height: float) -> tuple[OutageR
                 error,
                 float(np.sqrt(np.mean(outages.forward_end_m[of] ** 2))),
                 float(np.mean(outages.ratio[of] <= factor)),
-                error / sigma,
+                _rms_over_sigma(outages, of) / factor,
                 float(length_s * of.sum()),
                 float(np.sqrt(np.mean(outages.down_m[of] ** 2))),
                 float(np.mean(outages.down_ratio[of] <= height)),

@@ -56,6 +56,8 @@ class OnboardError:
     quantity : str
     unit : str
     samples : int
+    judged_share : float
+        Of the filter's samples: the smoothed attitude beside the others is not sure itself.
     offset, offset_sigma : float or None
         Constant over the log; None where none was looked for. It is never an error of the filter.
     offset_cause : str
@@ -90,6 +92,7 @@ class OnboardError:
     spans: tuple[WrongSpan, ...] = ()
     changes: tuple[ChangeOfConstant, ...] = ()
     axes_sigma: float | None = None
+    judged_share: float = 1.0
 
     @property
     def changed(self) -> str:

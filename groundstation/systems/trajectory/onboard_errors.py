@@ -19,6 +19,7 @@ from groundstation.systems.trajectory.onboard_offsets import (
     time_shift,
 )
 from groundstation.systems.trajectory.onboard_output import FEWEST, FilterOutput
+from groundstation.systems.trajectory.quantity_answer import SURE_DEG
 from groundstation.systems.trajectory.sampling import at_times
 from groundstation.systems.trajectory.solution import FloatArray, TrackOfStates
 
@@ -29,11 +30,15 @@ STEEP_DEG = 80.0  # pitch beyond which roll and heading say little
 
 @dataclass(frozen=True)
 class ErrorsOfOutput:
-    """Errors at the samples, constants taken off, and these."""
+    """Errors at the samples, constants taken off, and these.
+
+    ``attitude_judged`` is the share of the samples of roll, pitch and heading beside which ours is sure enough.
+    """
 
     ours: TrackOfStates
     attitude_deg: FloatArray
     attitude_offsets: tuple[Constant, Constant, Constant]
+    attitude_judged: FloatArray
     velocity_mps: FloatArray
     plane_m: FloatArray
     place: PlaceOffset
@@ -100,7 +105,7 @@ def _expected(ours: TrackOfStates, turn: FloatArray | None) -> FloatArray:
 def errors_of(track: TrackOfStates, output: FilterOutput, delay_s: float) -> ErrorsOfOutput:
     at_s = output.time_s - delay_s
     ours, length_s = at_times(track, at_s), float(at_s[-1] - at_s[0])
-    attitude, offsets = _attitude(output, ours, length_s)
+    attitude, offsets, judged = _attitude(output, ours, length_s)
     before, after = (at_times(track, at_s + part).heading_deg for part in (-RATE_S, RATE_S))
     rate = np.deg2rad(wrap_180(after - before)) / (2.0 * RATE_S)
     velocity = output.velocity_mps - ours.velocity_mps
@@ -109,13 +114,16 @@ def errors_of(track: TrackOfStates, output: FilterOutput, delay_s: float) -> Err
     velocity[:, :2] -= np.where(np.isfinite(swing), swing, 0.0)
     height = output.height_m - ours.height_m
     level = centre_of(height, ours.position_sigma_m[:, 2], length_s)
-    return ErrorsOfOutput(ours, attitude, offsets, velocity, plane, place, height - level.value, level)
+    return ErrorsOfOutput(ours, attitude, offsets, judged, velocity, plane, place, height - level.value, level)
 
 
 def _attitude(
     output: FilterOutput, ours: TrackOfStates, length_s: float
-) -> tuple[FloatArray, tuple[Constant, Constant, Constant]]:
-    """Return errors of roll, pitch and heading, and what was constant in them."""
+) -> tuple[FloatArray, tuple[Constant, Constant, Constant], FloatArray]:
+    """Return errors of roll, pitch and heading, what was constant in them, and the shares that are judged.
+
+    Where ours is not sure itself no error is told.
+    """
     turn = _turn(output, ours)
     expected = _expected(ours, turn)[:, :3]
     difference = output.attitude_deg - expected
@@ -123,11 +131,14 @@ def _attitude(
     error = _flat(difference) if turn is None else np.asarray(wrap_180(difference))
     is_steep = np.repeat(np.abs(expected[:, 1:2]) > STEEP_DEG, 3, axis=1)
     error = np.where(is_steep, np.nan, error)
+    is_sure = ours.attitude_sigma_deg < SURE_DEG
+    judged = np.sum(is_sure & np.isfinite(error), axis=0) / np.maximum(np.sum(np.isfinite(error), axis=0), 1)
+    error = np.where(is_sure, error, np.nan)
     found = [centre_of(one, sigma, length_s) for one, sigma in zip(error.T, ours.attitude_sigma_deg.T, strict=True)]
     roll, pitch, heading = (
         Constant(float(wrap_180(base + one.value)), one.sigma) for base, one in zip(constant, found, strict=True)
     )
-    return error - np.array([one.value for one in found]), (roll, pitch, heading)
+    return error - np.array([one.value for one in found]), (roll, pitch, heading), judged
 
 
 def _plane(

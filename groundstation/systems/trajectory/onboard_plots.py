@@ -9,7 +9,7 @@ from groundstation.chapters.plots.common import has_values, span
 from groundstation.plots.axes import ZERO, time_axis
 from groundstation.plots.marks import AnyMark, Band, Curve, Floats
 from groundstation.plots.plot import Axis, Panel, Plot, Row
-from groundstation.plots.ranges import broken_at_gaps, finite, symmetric
+from groundstation.plots.ranges import broken_at_gaps, broken_at_wrap, finite, symmetric
 from groundstation.results.flight import FlightResults
 from groundstation.systems.trajectory.arrays import TrajectoryOnboard
 
@@ -62,10 +62,11 @@ def _errors(
     rows: list[Row] = []
     for axis, values, sigma in known:
         time_s, error, half = broken_at_gaps(data.time_s, values, NORMAL_95 * sigma)
+        line_s, line = broken_at_wrap(time_s, error) if axis.endswith("°") else (time_s, error)
         marks: list[AnyMark] = [
             Band(x=time_s, low=-half, high=half, role="answer", name="95 % of the smoothed solution"),
             ZERO,
-            Curve(x=time_s, y=error, role="ins", name="on-board − smoothed"),
+            Curve(x=line_s, y=line, role="ins", name="on-board − smoothed"),
         ]
         low, high = symmetric(np.append(usual(values), usual(half)), 1e-3)
         panel = Panel(marks, ends, Axis(axis, low=low, high=high), legend="" if rows else "above")

@@ -1,5 +1,6 @@
 """Rows and figure of the errors of an on-board filter."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -98,7 +99,8 @@ def rows_of(
         offset = found.attitude_offsets[axis]
         told = _told(offset, "mounting", f"{ANGLES[axis] if axis < 2 else 'yaw'} {offset.value:+.2f} deg")
         own = ours.attitude_sigma_deg[:, axis]
-        rows.append(_row(ANGLES[axis], found.attitude_deg[:, axis], own, told, (shown, sigma), bins, axes[axis]))
+        row = _row(ANGLES[axis], found.attitude_deg[:, axis], own, told, (shown, sigma), bins, axes[axis])
+        rows.append(None if row is None else replace(row, judged_share=float(found.attitude_judged[axis])))
     rows = [rows[2], rows[0], rows[1]]
     plane = (
         np.column_stack([figure.velocity_north_mps, figure.velocity_east_mps]),

@@ -55,3 +55,6 @@ OPENING_ERROR: Mapping[Quantity, float] = MappingProxyType(
         "vertical velocity": 1.0,
     }
 )
+
+
+SURE_DEG = 5.0  # sigma of our attitude above which it judges nobody

@@ -13,7 +13,7 @@ from groundstation.systems.known import Known
 from groundstation.systems.trajectory import checks, figures, fix_residuals, judge, tell
 from groundstation.systems.trajectory.aids_input import Aids, aids_of
 from groundstation.systems.trajectory.answer import BestTrajectory, TrajectoryState, UnitMounting
-from groundstation.systems.trajectory.checks_answer import HeadingHypothesis, InnovationRow
+from groundstation.systems.trajectory.checks_answer import HeadingHypothesis, InnovationRow, RaisedSigma
 from groundstation.systems.trajectory.estimate import Estimate
 from groundstation.systems.trajectory.gather import gather
 from groundstation.systems.trajectory.gathered import Gathered
@@ -176,8 +176,8 @@ def _answered(
     if sigma_deg > settings.heading_sigma_max_deg and not _are_two(hypotheses, settings):
         raise NotAssessableError(
             SUBJECT,
-            f"heading to {sigma_deg:.1f} deg (sigma) alone, limit {settings.heading_sigma_max_deg:g}: the motion does "
-            "not show it",
+            f"heading to {sigma_deg:.1f} deg (sigma) alone, limit {settings.heading_sigma_max_deg:g}: "
+            f"{_why_heading(raised, settings)}",
         )
     gates = _gates(innovations, sigma_deg, factors, settings)
     state, reasons = _state(gathered, mounting, main, hypotheses, gates, outages, factors, settings)
@@ -245,6 +245,12 @@ def _fits(innovations: tuple[InnovationRow, ...], main: Estimate, settings: Traj
     share = checks.used_share(main)
     if share < 0.5:
         raise NotAssessableError(SUBJECT, f"only {share:.0%} of GNSS agrees with the unit: they do not go together")
+
+
+def _why_heading(raised: tuple[RaisedSigma, ...], settings: TrajectorySettings) -> str:
+    """Return why the heading is not known: its sigma had to be raised, or the motion does not show it."""
+    row = next(one for one in raised if one.name == "heading")
+    return row.reason if row.factor > settings.raised_doubt else "the motion does not show it"
 
 
 def _hypotheses(main: Estimate) -> tuple[HeadingHypothesis, ...]:

@@ -19,6 +19,7 @@ from groundstation.systems.trajectory.short_spans import QUIET_MPS2, Steps
 LONG_S, LONG_SHARE = 10.0, 0.2  # of the log: stuck for so long needs less motion beside it
 SAME = 1e-6  # relative: increments and their intervals are logged in single precision
 MOVES = (5.0 / DEG_PER_RAD, 2.0)  # rad/s, m/s2: spread over 90 % of the samples of what moves
+FLICKERS = 0.7  # of the samples: at the edge of a step half of them change by less noise than a step
 FEWEST_CALM = 5
 AT_END, FEWEST_AT_END = 1e-6, 3  # relative nearness to the largest value, and how many in a row are saturated
 LEAST_END = (100.0 / DEG_PER_RAD, 18.0)  # no gyro and no accelerometer ends below
@@ -42,7 +43,8 @@ def without_stuck(samples: UnitSamples, topic: str, settings: InputSettings, not
         for start, end in _runs(stays[axis]):
             length_s = samples.time_s[end] - samples.time_s[start]
             is_long = length_s >= long_s and changes[start:end].mean() > 0.5
-            if is_long or (length_s > settings.stuck_s and _moves(samples.rates[start:end])):
+            is_alone = _flicker(stays, axis, start, end)
+            if is_long or (length_s > settings.stuck_s and (is_alone or _moves(samples.rates[start:end]))):
                 bad[start : end + 1] = True
                 places.append(float(samples.time_s[start]))
                 count += end + 1 - start
@@ -55,6 +57,16 @@ def without_stuck(samples: UnitSamples, topic: str, settings: InputSettings, not
         stuck = [note.text.removesuffix(": left out") for note in notes if note.code == "stuck_axis"]
         raise NotAssessableError(SUBJECT, stuck[0])
     return samples.take(~bad)
+
+
+def _flicker(stays: list[BoolArray], axis: int, start: int, end: int) -> bool:
+    """Tell whether the two other axes of the sensor hardly keep a value.
+
+    Then its noise is above its resolution, and no sound axis keeps one.
+    """
+    first = axis - axis % 3
+    others = [stays[one][start:end].mean() for one in range(first, first + 3) if one != axis]
+    return max(others) < 1.0 - FLICKERS
 
 
 def _stays(samples: UnitSamples, axis: int) -> BoolArray:
