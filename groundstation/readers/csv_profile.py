@@ -26,7 +26,7 @@ from groundstation.readers.profile import Profile
 from groundstation.readers.profile_file import load, shipped
 from groundstation.readers.profile_fit import Fit, delimiter_of, delimiters_of, fit_at, fit_below, joined_gaps
 from groundstation.readers.profile_layout import layout_of
-from groundstation.readers.profile_sources import READER, other_profiles
+from groundstation.readers.profile_sources import READER, known_as, other_profiles
 from groundstation.readers.rtklib_tag import TaggedClock, clock_by_tag
 from groundstation.readers.sections import MOST, TableSection, header_places, left_out, lines_with, mark_of, told
 from groundstation.readers.source import Claim, Source
@@ -41,18 +41,23 @@ MOST_LINES = 10_000  # lines searched for it otherwise
 _OF_NUMBERS = frozenset(b"%c" % sign for sign in b"0123456789+-.,;")
 _A_NUMBER = re.compile(r"\s*[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?\s*")
 _COMMENTS = re.compile(r"\A(?:#[^\n]*\n\s*)+")
+MOST_DOUBTS = 10  # of a draft, told one by one
 FEWEST_ROWS = 3  # above the header row that are those of another log
 
 if TYPE_CHECKING:
     from groundstation.readers.vehicles import Vehicles
 
 
-@cache
 def known_profiles() -> tuple[Profile, ...]:
     """List the profiles that are tried on every table: those of others before ours."""
     others = other_profiles().profiles
     taken = {profile.name for profile in others}
-    return (*others, *(profile for profile in shipped() if profile.name not in taken))
+    return (*others, *(profile for profile in _shipped() if profile.name not in taken))
+
+
+@cache
+def _shipped() -> tuple[Profile, ...]:
+    return shipped()
 
 
 def sniff(source: Source) -> Claim | None:
@@ -139,7 +144,7 @@ def claim_by(source: Source, profile: Path) -> Claim:
     UnreadableLogError
         When the file has no header row with the columns that the profile asks for.
     """
-    loaded = load(profile)
+    loaded = load(known_as(profile))
     source.seen[profile] = _fitted(source, loaded)
     return Claim(NAME, loaded.name, 1.0)
 
@@ -150,7 +155,7 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
     It is read by ``profile``, or by the shipped profile that fits.
     """
     if profile is not None:
-        fit = source.seen.pop(profile, None) or _fitted(source, load(profile))  # as just claimed
+        fit = source.seen.pop(profile, None) or _fitted(source, load(known_as(profile)))  # as just claimed
     else:
         found = _best(source)
         if found is None:
@@ -190,6 +195,7 @@ def _items(whole: Source, fit: Fit) -> Iterator[Item]:
         clock_remarks = (*clock_remarks, vehicles.remark)
     items = TableReader(source, sections, losses).items(header)
     yield next(items)
+    yield from _doubts(fit.profile)
     yield from dict.fromkeys([*remarks, *clock_remarks, *section_remarks, *unusable_references(fit.metadata)])
     yield from () if above else _above(fit)
     time = ", ".join(name for name in fit.profile.time.columns if name in fit.position)
@@ -198,6 +204,15 @@ def _items(whole: Source, fit: Fit) -> Iterator[Item]:
     }
     for item in with_reasons(misnamed(items, _slips(fit), fit.header.number), source, places, time):
         yield item if clock is None or not isinstance(item, RecordBatch) else _undrifted(item, clock)
+
+
+def _doubts(profile: Profile) -> Iterator[Remark]:
+    """Yield what a draft assumes that nobody has looked at."""
+    if profile.doubts:
+        more = f" and {len(profile.doubts) - MOST_DOUBTS} more" if len(profile.doubts) > MOST_DOUBTS else ""
+        told = "; ".join(profile.doubts[:MOST_DOUBTS])
+        where = f"{profile.path.name} has question marks"
+        yield Remark("unchecked_draft", f"{where}: {told}{more}: correct each line, or take its mark away")
 
 
 def _vehicles(source: Source, fit: Fit, sections: Sequence[TableSection], losses: Losses) -> "Vehicles | None":
