@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.base.errors import SettingsError
+from groundstation.base.errors import SettingsError, UnreadableLogError
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.verbs.profiles import new_profile, try_profile
@@ -181,3 +181,60 @@ def test_a_profile_of_the_users_folder_by_its_name_and_at_once(own_profiles: Pat
     assert csv_profile.sniff(registry.Source(at)) is not None
     assert registry.identify(at, Path("boat")).title == "csv-profile boat"
     assert known_as(Path("garmin-g5")).name == "garmin_g5.toml"
+
+
+def test_degrees_minutes_seconds_in_three_cells_below_one_name(write: Write) -> None:
+    cells = (f"  {t}.0  -0 30 {t:02d}.000   -0 00 {59 - t:02d}.5  120.0  {t}.0" for t in range(30))
+    head = "Export\n\n  UTCTime  Latitude  Longitude  H-Ell  Heading\n  (sec)  (+/-D M S)  (+/-D M S)  (m)  (deg)"
+    at = write("a.txt", table(head, *cells))
+    read = Read(at, drafted(at)[0])
+    assert read.values("gnss", "latitude_deg")[3] == pytest.approx(-0.5 - 3.0 / 3600.0, abs=1e-12)
+    assert read.values("gnss", "longitude_deg")[0] == pytest.approx(-59.5 / 3600.0, abs=1e-12)
+    assert read.values("gnss", "altitude_ellipsoid_m")[0] == 120.0 and read.values("ins", "true_heading_deg")[7] == 7.0
+
+
+@pytest.mark.parametrize("unit", ["deg mag", "deg M", "mag", "M", "°M", "degm"])
+def test_directions_from_magnetic_north_by_their_unit(write: Write, unit: str) -> None:
+    given = rows("{t},{n:.5f},{e:.5f},85.0,84.0")
+    at = write("a.csv", table(f"time_s,lat,lon,Track ({unit}),Hdg ({unit})", *given))
+    read = Read(at, drafted(at)[0])
+    assert read.values("ins", "magnetic_heading_deg")[0] == 84.0
+    assert "no gnss.track_deg" in read.remarks["magnetic_track"].text
+    at = write("b.csv", table(f"time_s,lat,lon,Track ({unit}),Hdg ({unit}),MagVar", *(f"{row},5.0" for row in given)))
+    read = Read(at, drafted(at)[0])
+    assert read.values("ins", "true_heading_deg")[0] == 89.0
+
+
+def test_longitudes_from_0_to_360(write: Write) -> None:
+    at = write("a.csv", table("time_s,lat,lon", *(f"{t},33.{t},289.5{t}" for t in range(10, 40))))
+    assert Read(at, drafted(at)[0]).values("gnss", "longitude_deg")[0] == pytest.approx(-70.49)
+    at = write("b.csv", table("time_s,lat,lon", *(f"{t},33.{t},{170 + t}.5" for t in range(40))))
+    assert any("counts from 0 to 360" in one for one in new_profile(at).doubts)
+
+
+def test_degrees_and_minutes_with_a_letter_in_the_cell(write: Write) -> None:
+    at = write("a.csv", table("time_s,lat,lon", *(f"{t},5530.{t}N,W03730.{t}" for t in range(10, 40))))
+    read = Read(at, drafted(at)[0])
+    assert read.values("gnss", "latitude_deg")[0] == pytest.approx(55.0 + 30.1 / 60.0)
+    assert read.values("gnss", "longitude_deg")[0] == pytest.approx(-37.0 - 30.1 / 60.0)
+
+
+@pytest.mark.parametrize(("name", "unit"), [("Millisec", 1e-3), ("Fraction", 1.0), ("ms", 1e-3), ("usec", 1e-6)])
+def test_a_column_with_the_fraction_of_the_second(write: Write, name: str, unit: float) -> None:
+    cells = (f"2021-03-12,12:00:{t // 4:02d},{round(t % 4 * 0.25 / unit, 6):g},55.{t},37.{t}" for t in range(100))
+    at = write("a.csv", table(f"Date,Time,{name},Lat,Lon", *cells))
+    profile, text = drafted(at)
+    first = iso_to_utc_ns("2021-03-12T12:00:00Z")[0]
+    assert "fraction of the second" in text
+    assert Read(at, profile).times("gnss") == [first + t * NS_PER_S // 4 for t in range(100)]
+
+
+def test_whole_seconds_without_a_fraction_are_told(write: Write) -> None:
+    at = write("a.csv", table("UTC,Lat,Lon", *(f"2021-03-12T12:00:{t // 4:02d}Z,55.{t},37.{t}" for t in range(100))))
+    assert "rows repeat the time of others" in new_profile(at).time.doubt
+
+
+def test_days_as_excel_counts_them_are_the_cause(write: Write) -> None:
+    at = write("a.csv", table("Date,Lat,Lon", *(f"{44267.5 + t / 86400:.9f},55.{t},37.{t}" for t in range(20))))
+    with pytest.raises(UnreadableLogError, match="days since 1900"):
+        new_profile(at)
