@@ -78,7 +78,10 @@ def findings_of(check: ProfileCheck) -> tuple[Finding, ...]:
     missing = (Finding("warn", "profile.missing_column", one.text) for one in check.missing)
     causes = (Finding("warn", "profile.unread_column", one) for one in check.causes)
     lost = map(damage_finding, check.damages)
-    told = (Finding("info", f"reader.{one.code}", one.text, one.topic) for one in check.remarks)
+    told = (
+        Finding("warn" if one.code == "unchecked_draft" else "info", f"reader.{one.code}", one.text, one.topic)
+        for one in check.remarks
+    )
     return (*missing, *causes, *lost, *told)
 
 
