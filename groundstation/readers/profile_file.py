@@ -39,7 +39,7 @@ def load(path: Path) -> Profile:
 
 
 def doubts_of(text: str) -> tuple[str, ...]:
-    """Return the question marks that a draft still has: ``# ? ...`` and ``; ? ...`` in comments.
+    """Return the question marks that a draft still has, ``# ? ...`` and ``; ? ...``.
 
     Examples
     --------

@@ -10,14 +10,14 @@ import os
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.plug_ins import load_plug_ins
 from groundstation.readers.profile import Profile
-from groundstation.readers.profile_file import SHIPPED, load
+from groundstation.readers.profile_file import SHIPPED, load, shipped
 
 ENTRY_POINT_GROUP = "groundstation.profiles"
 READER = "csv-profile"  # that of all profiles; its title has the profile's name behind
@@ -63,6 +63,18 @@ def _loaded(folder: Path, _state: tuple[object, ...]) -> OtherProfiles:
 
     failures += load_plug_ins(ENTRY_POINT_GROUP, "profile", take)
     return OtherProfiles(tuple(found.values()), tuple(failures))
+
+
+def known_profiles() -> tuple[Profile, ...]:
+    """List the profiles that are tried on every table: those of others before ours."""
+    others = other_profiles().profiles
+    taken = {profile.name for profile in others}
+    return (*others, *(profile for profile in _shipped() if profile.name not in taken))
+
+
+@cache
+def _shipped() -> tuple[Profile, ...]:
+    return shipped()
 
 
 def known_as(path: Path) -> Path:

@@ -238,3 +238,35 @@ def test_days_as_excel_counts_them_are_the_cause(write: Write) -> None:
     at = write("a.csv", table("Date,Lat,Lon", *(f"{44267.5 + t / 86400:.9f},55.{t},37.{t}" for t in range(20))))
     with pytest.raises(UnreadableLogError, match="days since 1900"):
         new_profile(at)
+
+
+def test_widths_count_characters(tmp_path: Path) -> None:
+    profile = tmp_path / "p.toml"
+    profile.write_text(
+        'name = "p"\n[recognise]\nwidths = [6, 6, 9, 11]\n[time]\nkind = "seconds"\ncolumn = "t"\n[columns]\n'
+        'lat = { field = "gnss.latitude_deg", unit = "deg" }\nlon = { field = "gnss.longitude_deg", unit = "deg" }\n'
+    )
+    rows = "".join(f"{t:6.1f}{'Жук °'[: t % 6]:>6}{55.0:9.5f}{-137.0:11.6f}\n" for t in range(12))
+    for encoding in ("utf-8", "cp1251"):
+        at = tmp_path / f"{encoding}.txt"
+        at.write_bytes(("     t  name      lat        lon\n" + rows).encode(encoding))
+        read = Read(at, profile)
+        assert read.values("gnss", "latitude_deg") == [55.0] * 12 and not read.damages
+        assert read.values("gnss", "longitude_deg") == [-137.0] * 12
+
+
+def test_a_week_that_rolls_over_in_the_file(write: Write) -> None:
+    at = write("a.csv", "w,s,lat,lon\n1023,604799,1,2\n0,0,1,2\n0,1,1,2\n")
+    profile = at.with_suffix(".toml")
+    profile.write_text(
+        'name = "p"\n[time]\nkind = "gps_week"\nweek = "w"\nseconds = "s"\nearliest_year = 2010\n[columns]\n'
+        'lat = { field = "gnss.latitude_deg", unit = "deg" }\n'
+    )
+    first = iso_to_utc_ns("2019-04-06T23:59:41Z")[0]
+    assert Read(at, profile).times("gnss") == [first + t * NS_PER_S for t in range(3)]
+
+
+def test_a_name_that_occurs_twice_is_told(write: Write) -> None:
+    at = write("a.csv", table("time_s,lat,lon,lat", *rows("{t},{n:.5f},{e:.5f},9")))
+    read = Read(at, drafted(at)[0])
+    assert read.values("gnss", "latitude_deg")[0] == 55.0 and read.remarks["duplicate_column"].text.startswith("lat:")

@@ -62,10 +62,10 @@ def try_profile(profile: Path, table: Path) -> ProfileCheck:
 
 def known_profiles() -> tuple[tuple[KnownProfile, ...], tuple[str, ...]]:
     """Return the profiles tried on every table, and a line for each that cannot be used."""
-    from groundstation.readers import csv_profile
+    from groundstation.readers.profile_sources import known_profiles as tried_profiles
     from groundstation.readers.profile_sources import other_profiles
 
-    found = tuple(KnownProfile(one.name, one.description, _origin(one)) for one in csv_profile.known_profiles())
+    found = tuple(KnownProfile(one.name, one.description, _origin(one)) for one in tried_profiles())
     return found, other_profiles().failures
 
 

@@ -16,7 +16,7 @@ _DMS = re.compile(
     r"(?:['′:m ]\s*(?:\d{1,2}(?:\.\d*)?\s*[\"″s]?)?)?\s*[NSEWnsew]?"
 )
 _SIDE = re.compile(r"[NSEWnsew]\s*\d{1,3}(?:\.\d*)?|\d{1,3}(?:\.\d*)?\s*°?\s*[NSEWnsew]")
-_RUN_TOGETHER = re.compile(r"[NSEWnsew]\s*\d{3,5}\.\d+|\d{3,5}\.\d+\s*[NSEWnsew]")
+_RUN_TOGETHER = re.compile(r"[NSEWnsew]\s*\d{4,5}\.\d+|\d{4,5}\.\d+\s*[NSEWnsew]")
 _WITH_UNIT = re.compile(r"[+-]?\d+(?:\.\d*)?\s*[A-Za-z°%/²]+[A-Za-z0-9/^²]*")
 _MISSING_WORDS = frozenset(
     ("n/a", "na", "null", "none", "nil", "inv", "invalid", "no data", "nodata", "no fix", "unknown", "#value!", "#n/a")
@@ -72,7 +72,7 @@ def are_run_together(cells: Sequence[str]) -> bool:
 
     Examples
     --------
-    >>> are_run_together(["5530.1200N", "S 00102.5"]), are_run_together(["55.5N"])
+    >>> are_run_together(["5530.1200N", "S 00102.5"]), are_run_together(["030.5E"])
     (True, False)
     """
     return bool(cells) and all(_RUN_TOGETHER.fullmatch(cell.strip()) for cell in cells)

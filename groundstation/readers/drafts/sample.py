@@ -234,7 +234,7 @@ def _spaced(source: Source, encoding: str) -> "tuple[Source, list[HeadLine], _Sh
 
 
 def _parts_of_angles(rows: Sequence[Sequence[str]]) -> tuple[int, tuple[int, ...]]:
-    """Return cells of a row and gaps between them that part none: of degrees, minutes, seconds.
+    """Return cells of a row, and gaps between parts of degrees, minutes and seconds.
 
     A latitude or longitude has three cells below its name; 0 and no gaps where the names do not tell that.
     """
