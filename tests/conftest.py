@@ -20,7 +20,7 @@ from groundstation.base.garbage import importing
 from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
-from groundstation.readers import csv_profile, profile_sources, registry
+from groundstation.readers import profile_sources, registry
 from tests.browser import Browser, BrowserError, browser
 from tests.viewer_shots import NoViewerError, viewer
 
@@ -101,5 +101,5 @@ def own_profiles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pa
 
 def forget_profiles() -> None:
     """Forget the profiles that were loaded, as a new process does."""
-    for cached in (profile_sources.other_profiles, csv_profile.known_profiles, registry._plug_ins):
+    for cached in (profile_sources._loaded, registry._plug_ins):
         cached.cache_clear()

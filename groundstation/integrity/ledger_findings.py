@@ -23,6 +23,7 @@ _REMARKS_THAT_WARN = (
         "plug_in",
         "duplicate_column",
         "missing_columns",
+        "unchecked_draft",
         "icd_of_another",
         "tmats_contradicted",
         "week_rollover",

@@ -123,17 +123,20 @@ def degrees(text: Any, among_parts: bool = False) -> TableCells:
 def degrees_and_minutes(text: Any) -> TableCells:
     """Convert degrees and minutes that are run together, as receivers write them, to degrees.
 
-    A sign stands before, or a letter N, S, E or W behind.
+    A sign stands before, or a letter N, S, E or W on either side.
 
     Examples
     --------
-    >>> read = degrees_and_minutes(pa.array(["4730.6", "-00815.0", "12215.6W", "4761.0", None]))
+    >>> read = degrees_and_minutes(pa.array(["4730.6", "-00815.0", "W12215.6", "4761.0", None]))
     >>> read.column.values.round(6).tolist(), read.unreadable.tolist()
     ([47.51, -8.25, -122.26, nan, nan], [False, False, False, True, False])
     """
-    parts = pc.extract_regex(text, r"^\s*(?P<number>[+-]?\d+(?:\.\d*)?)\s*(?P<side>[NSEWnsew]?)\s*$")
-    read = numbers(pc.struct_field(parts, [0]))
-    is_minus = arrow.mask(pc.fill_null(pc.match_substring_regex(pc.struct_field(parts, [1]), "[SWsw]"), arrow.FALSE))
+    parts = pc.extract_regex(
+        text, r"^\s*(?P<before>[NSEWnsew]?)\s*(?P<number>[+-]?\d+(?:\.\d*)?)\s*(?P<side>[NSEWnsew]?)\s*$"
+    )
+    read = numbers(pc.struct_field(parts, [1]))
+    letters = pc.binary_join_element_wise(pc.struct_field(parts, [0]), pc.struct_field(parts, [2]), "")
+    is_minus = arrow.mask(pc.fill_null(pc.match_substring_regex(letters, "[SWsw]"), arrow.FALSE))
     size = np.abs(read.column.values)
     whole, minutes = np.divmod(size, 100.0)
     present = read.column.mask & (minutes < 60.0)

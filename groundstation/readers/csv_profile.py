@@ -7,7 +7,6 @@ profile's raw topic.
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,42 +16,29 @@ from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.slips import slips
 from groundstation.readers.days import day_ns
-from groundstation.readers.dialect import Dialect, HeadLine, detect_encoding, head_lines, split_cells
+from groundstation.readers.dialect import Dialect
 from groundstation.readers.drafts.reasons import with_reasons
 from groundstation.readers.layout import TableLayout
 from groundstation.readers.losses import Losses
 from groundstation.readers.misnamed import misnamed
 from groundstation.readers.profile import Profile
-from groundstation.readers.profile_file import load, shipped
-from groundstation.readers.profile_fit import Fit, delimiter_of, delimiters_of, fit_at, fit_below, joined_gaps
+from groundstation.readers.profile_file import load
+from groundstation.readers.profile_fit import Fit, delimiter_of, fit_below
 from groundstation.readers.profile_layout import layout_of
-from groundstation.readers.profile_sources import READER, other_profiles
+from groundstation.readers.profile_match import best_fit, fitted, seen_as, with_joined
+from groundstation.readers.profile_sources import READER, known_as
 from groundstation.readers.rtklib_tag import TaggedClock, clock_by_tag
 from groundstation.readers.sections import MOST, TableSection, header_places, left_out, lines_with, mark_of, told
 from groundstation.readers.source import Claim, Source
-from groundstation.readers.spaced import FixedSource, SpacedSource
+from groundstation.readers.spaced import SpacedSource
 from groundstation.readers.start import unusable_references, utc_of_zero
 
 NAME = READER
-DISTINCTIVE_COLUMNS = 4
-_HEAD_LINES = 1000
-DAMAGED_HEAD_LINES = 20  # lines searched for a header row when the first line is not the profile's
-MOST_LINES = 10_000  # lines searched for it otherwise
-_OF_NUMBERS = frozenset(b"%c" % sign for sign in b"0123456789+-.,;")
-_A_NUMBER = re.compile(r"\s*[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?\s*")
-_COMMENTS = re.compile(r"\A(?:#[^\n]*\n\s*)+")
+MOST_DOUBTS = 10  # of a draft, told one by one
 FEWEST_ROWS = 3  # above the header row that are those of another log
 
 if TYPE_CHECKING:
     from groundstation.readers.vehicles import Vehicles
-
-
-@cache
-def known_profiles() -> tuple[Profile, ...]:
-    """List the profiles that are tried on every table: those of others before ours."""
-    others = other_profiles().profiles
-    taken = {profile.name for profile in others}
-    return (*others, *(profile for profile in shipped() if profile.name not in taken))
 
 
 def sniff(source: Source) -> Claim | None:
@@ -62,71 +48,8 @@ def sniff(source: Source) -> Claim | None:
     family, the file goes to the one whose header row stands first, or to the one that has the long names of that row
     below it.
     """
-    found = _best(source)
+    found = best_fit(source)
     return None if found is None else Claim(NAME, found[1].profile.name, found[0])
-
-
-def _best(source: Source) -> tuple[float, Fit] | None:
-    """Return the shipped profile that fits a file, and how sure that is."""
-    first = source.head[:4096].removeprefix(b"\xef\xbb\xbf").decode("utf-8", errors="replace").lstrip()
-    others = set(map(id, other_profiles().profiles))
-    profiles = [profile for profile in known_profiles() if profile.first_lines or id(profile) in others]
-    row = _COMMENTS.sub("", first)  # the first line that is none of the metadata above a header
-    is_one = any(first.startswith(profile.first_lines) for profile in profiles if profile.first_lines)
-    encoding = detect_encoding(source.head, source.name)
-    below = (
-        {profile.name for profile in profiles if _stands_below(source, profile)} if _begins_with_rows(source) else set()
-    )
-    most = MOST_LINES if below else _HEAD_LINES if is_one else DAMAGED_HEAD_LINES
-    lines = head_lines(source, encoding, most)
-    found: list[tuple[float, Fit]] = []
-    last = len(lines)  # a relative has its header near by
-    for profile in profiles:
-        is_its_own = first.startswith(profile.first_lines) or row.startswith(profile.first_lines)
-        is_near = not is_its_own and profile.name not in below
-        near = lines[:DAMAGED_HEAD_LINES]
-        if is_near and not any(all(name in line.text for name in profile.required) for line in near):
-            continue
-        profile = profile.for_file(source.name)
-        seen = head_lines(_seen(source, profile), encoding, most) if profile.is_spaced else lines
-        if not profile.first_lines:
-            fit = _named_by(profile, encoding, seen)
-            found += [(1.0, fit)] if fit is not None else []
-            continue
-        if profile.names:
-            fit = _without_header(profile, encoding, seen) if is_its_own else None
-        else:
-            fit = _fit(profile, encoding, seen[: min(last, DAMAGED_HEAD_LINES) if is_near else last])
-        count = 0 if fit is None else sum(rule.name in fit.position for rule in profile.columns)
-        if fit is not None and (is_its_own or count >= DISTINCTIVE_COLUMNS):
-            found.append((1.0 if is_its_own else 0.9, fit))
-            last = min(last, fit.header.number + DAMAGED_HEAD_LINES)
-    best = max(found, key=lambda one: (one[0], -one[1].header.number), default=None)
-    for one in found:
-        if best is not None and one[1].header in best[1].behind and one[1].told_count > best[1].told_count:
-            return one
-    return best
-
-
-def _named_by(profile: Profile, encoding: str, lines: Sequence[HeadLine]) -> Fit | None:
-    """Match a profile without a first line to a table that has all columns it needs."""
-    fit = None if profile.names else _fit(profile, encoding, lines)
-    wanted = [name for rule in profile.columns if not rule.is_optional for name in rule.names]
-    is_all = fit is not None and all(name in fit.position for name in wanted)
-    return fit if is_all and len({*wanted, *profile.required}) >= DISTINCTIVE_COLUMNS - 1 else None
-
-
-def _begins_with_rows(source: Source) -> bool:
-    """Tell whether a file begins with numbers, even if the first row is cut."""
-    return any(line.strip()[:1] in _OF_NUMBERS for line in source.head[:4096].split(b"\n", 2)[:2])
-
-
-def _stands_below(source: Source, profile: Profile) -> bool:
-    """Tell whether the profile's first line stands below the rows of another log.
-
-    The beginning of that other log is lost.
-    """
-    return any(b"\n" + line.encode() in source.head for line in profile.first_lines)
 
 
 def claim_by(source: Source, profile: Path) -> Claim:
@@ -139,8 +62,8 @@ def claim_by(source: Source, profile: Path) -> Claim:
     UnreadableLogError
         When the file has no header row with the columns that the profile asks for.
     """
-    loaded = load(profile)
-    source.seen[profile] = _fitted(source, loaded)
+    loaded = load(known_as(profile))
+    source.seen[profile] = fitted(source, loaded)
     return Claim(NAME, loaded.name, 1.0)
 
 
@@ -150,14 +73,14 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
     It is read by ``profile``, or by the shipped profile that fits.
     """
     if profile is not None:
-        fit = source.seen.pop(profile, None) or _fitted(source, load(profile))  # as just claimed
+        fit = source.seen.pop(profile, None) or fitted(source, load(known_as(profile)))  # as just claimed
     else:
-        found = _best(source)
+        found = best_fit(source)
         if found is None:
             raise UnreadableLogError(source.name, "no table of a known layout", "", "describe it by a profile")
         fit = found[1]
     try:
-        yield from _items(source, _joined(source, fit))
+        yield from _items(source, with_joined(source, fit))
     finally:
         source.seen.clear()
 
@@ -167,7 +90,7 @@ def _items(whole: Source, fit: Fit) -> Iterator[Item]:
     from groundstation.readers.table_clock import with_clock
     from groundstation.readers.table_reader import TableReader, truncated_header
 
-    source = _seen(whole, fit.profile, fit.cells, fit.joined)
+    source = seen_as(whole, fit.profile, fit.cells, fit.joined)
     utc_of_zero_ns, remarks = _utc_of_zero(fit, fit.metadata)
     clock: TaggedClock | None = None
     if fit.profile.time.has_tag and fit.last.ended:
@@ -190,6 +113,7 @@ def _items(whole: Source, fit: Fit) -> Iterator[Item]:
         clock_remarks = (*clock_remarks, vehicles.remark)
     items = TableReader(source, sections, losses).items(header)
     yield next(items)
+    yield from _doubts(fit.profile)
     yield from dict.fromkeys([*remarks, *clock_remarks, *section_remarks, *unusable_references(fit.metadata)])
     yield from () if above else _above(fit)
     time = ", ".join(name for name in fit.profile.time.columns if name in fit.position)
@@ -198,6 +122,15 @@ def _items(whole: Source, fit: Fit) -> Iterator[Item]:
     }
     for item in with_reasons(misnamed(items, _slips(fit), fit.header.number), source, places, time):
         yield item if clock is None or not isinstance(item, RecordBatch) else _undrifted(item, clock)
+
+
+def _doubts(profile: Profile) -> Iterator[Remark]:
+    """Yield what a draft assumes that nobody has looked at."""
+    if profile.doubts:
+        more = f" and {len(profile.doubts) - MOST_DOUBTS} more" if len(profile.doubts) > MOST_DOUBTS else ""
+        told = "; ".join(profile.doubts[:MOST_DOUBTS])
+        where = f"{profile.path.name} has question marks"
+        yield Remark("unchecked_draft", f"{where}: {told}{more}: correct each line, or take its mark away")
 
 
 def _vehicles(source: Source, fit: Fit, sections: Sequence[TableSection], losses: Losses) -> "Vehicles | None":
@@ -231,92 +164,6 @@ def _rows_of_another(fit: Fit) -> Dialect | None:
     if not any(line.text.lstrip().startswith(fit.profile.first_lines) for line in below):
         return None
     return replace(fit.dialect_to(None), first_byte=0, first_line=1, end_byte=fit.rows_above[-1].next_byte)
-
-
-def _fit(profile: Profile, encoding: str, lines: Sequence[HeadLine]) -> Fit | None:
-    """Find the header row: the first one that has every column the profile asks for."""
-    for at, line in enumerate(lines):
-        delimiter = delimiter_of(line.text, profile)
-        if delimiter:
-            return fit_at(profile, encoding, delimiter, lines, at)
-    return None
-
-
-def _seen(source: Source, profile: Profile, cells: int = 0, joined: tuple[int, ...] = ()) -> Source:
-    """Return the source with tabs for blanks, or between columns of fixed width."""
-    if not profile.is_spaced:
-        return source
-    key = profile.widths, cells, joined
-    if key not in source.seen:
-        source.seen[key] = (
-            FixedSource(source.path, source, profile.widths)
-            if profile.widths
-            else SpacedSource(source.path, source, cells, joined)
-        )
-    found: Source = source.seen[key]
-    return found
-
-
-def _joined(source: Source, fit: Fit) -> Fit:
-    """Return a match whose rows have degrees, minutes and seconds in one cell.
-
-    It is the match itself where the names do not ask for that."""
-    cells, joined = joined_gaps(fit.profile, fit.names, fit.first_rows)
-    if not joined or fit.profile.names:
-        return fit
-    lines = head_lines(_seen(source, fit.profile, cells, joined), fit.encoding, MOST_LINES)
-    again = fit_at(fit.profile, fit.encoding, fit.delimiter, lines, fit.header.number - 1)
-    return replace(again, cells=cells, joined=joined)
-
-
-def _without_header(profile: Profile, encoding: str, lines: Sequence[HeadLine]) -> Fit | None:
-    """Match a profile to a file without a header, most of whose first lines are rows of it.
-
-    Text may stand above them; what looks like rows and does not fit is counted as lost.
-    """
-    for delimiter in delimiters_of(profile):
-        top = HeadLine(0, 0, "", ended=True)
-        fit = Fit(profile, encoding, delimiter, profile.names, top)
-        at = next((place for place, line in enumerate(lines) if fit.is_row(line.text)), 0)
-        if all(_is_of_text(line.text, delimiter) for line in lines[:at]):
-            top = lines[at - 1] if at else top
-        else:
-            at = next((place for place, line in enumerate(lines) if not line.text.startswith("#")), len(lines))
-            top = lines[at - 1] if at else top
-        rows = tuple(line.text for line in lines[at : at + DAMAGED_HEAD_LINES] if line.text.strip())
-        header = HeadLine(top.number, top.next_byte, "", ended=True)
-        fit = replace(fit, header=header, above=tuple(lines[:at]), first_rows=rows)
-        if rows and 2 * sum(map(fit.is_row, rows)) >= len(rows):
-            return fit
-    return None
-
-
-def _is_of_text(line: str, delimiter: str) -> bool:
-    """Tell whether a line has no cell that is a number: it is no row that was torn."""
-    return line.startswith("#") or not any(_A_NUMBER.fullmatch(cell) for cell in split_cells(line, delimiter))
-
-
-def _fitted(source: Source, profile: Profile) -> Fit:
-    profile = profile.for_file(source.name)
-    encoding = detect_encoding(source.head, source.name)
-    if profile.names:
-        found = _without_header(profile, encoding, head_lines(_seen(source, profile), encoding))
-        if found is None:
-            expected = f"rows of {len(profile.names)} cells, numbers or times"
-            raise UnreadableLogError(
-                source.name, f"no row for profile {profile.name}", expected, f"check {profile.path.name}"
-            )
-        return found
-    fit = _fit(profile, encoding, head_lines(_seen(source, profile), encoding, MOST_LINES))
-    if fit is None:
-        from groundstation.readers.drafts.nearest import why_no_header
-
-        wanted = ", ".join(dict.fromkeys((*profile.required, *profile.time.asked)))
-        told = "; ".join(
-            filter(None, (f"no header row for profile {profile.name}", why_no_header(_seen(source, profile), profile)))
-        )
-        raise UnreadableLogError(source.name, told, f"a row with the columns {wanted}", f"check {profile.path.name}")
-    return fit
 
 
 def _above(fit: Fit) -> Iterator[Damage]:
@@ -416,8 +263,8 @@ def laid(source: Source, profile: Profile) -> tuple[Fit, TableLayout]:
         When the file has no header row with the columns that the profile asks for.
     """
     try:
-        fit = _joined(source, _fitted(source, profile))
-        seen = _seen(source, profile, fit.cells, fit.joined)
+        fit = with_joined(source, fitted(source, profile))
+        seen = seen_as(source, profile, fit.cells, fit.joined)
         utc_of_zero_ns, _remarks = _utc_of_zero(fit, fit.metadata)
         return fit, layout_of(fit, seen, utc_of_zero_ns, None)[0]
     finally:

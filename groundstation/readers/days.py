@@ -5,11 +5,13 @@ from datetime import datetime
 
 import numpy as np
 
+from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.months import with_number
 
 _DAY_NS = 86_400 * NS_PER_S
+ROLLOVER_WEEKS = 1024
 _WEEK_NS, _NEAR_NS = 7 * _DAY_NS, 3600 * NS_PER_S  # an hour about the end of a week
 _LAST_NS = 2**62 - _DAY_NS  # as that of times in cells
 _EPOCH_DAY = datetime(1970, 1, 1).toordinal()
@@ -45,12 +47,25 @@ class WeekCount:
     """Week that a writer counts late.
 
     Its seconds begin anew at midnight of Saturday, and the week stays. ``late`` is the week that stands for the one
-    after it, ``rows`` counts the rows that have it.
+    after it, ``first`` the week of the first row, ``rows`` counts the rows that have it.
     """
 
     late: int | None = None
+    first: int | None = None
     rows: int = 0
     _last: tuple[int, int] = (-1, 0)
+
+    def rollovers(self, week: FloatArray) -> FloatArray:
+        """Return 1024 weeks for each row behind a rollover inside the file, shape (n,).
+
+        Examples
+        --------
+        >>> WeekCount().rollovers(np.array([1023.0, 0.0, 1.0])).tolist()
+        [0.0, 1024.0, 1024.0]
+        """
+        if self.first is None and len(week):
+            self.first = int(week[0])
+        return np.where(week < (self.first or 0) - ROLLOVER_WEEKS / 2, float(ROLLOVER_WEEKS), 0.0)
 
     def to_add(self, week: Int64Array, second_ns: Int64Array) -> Int64Array:
         """Return the weeks to add to those of rows, shape (n,).

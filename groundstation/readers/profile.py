@@ -113,6 +113,7 @@ class Profile:
     ``names`` are those of the columns of a file that has no header row. ``has_blanks``: blanks part the columns;
     ``widths``: they stand at fixed places. ``missing``: texts and numbers that mean no value. ``key``: the column that
     tells vehicles apart, each of which has a log of its own; ``only``: those that are read, all if empty.
+    ``doubts``: question marks of a draft that nobody has taken away.
     """
 
     name: str
@@ -138,6 +139,7 @@ class Profile:
     find: Mapping[str, re.Pattern[str]] = field(default_factory=dict)
     find_in_name: Mapping[str, re.Pattern[str]] = field(default_factory=dict)
     join: Mapping[str, str] = field(default_factory=dict)
+    doubts: tuple[str, ...] = ()
 
     def for_file(self, name: str) -> "Profile":
         """Return the profile with the metadata that the name of a file tells."""

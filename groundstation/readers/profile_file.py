@@ -6,6 +6,7 @@ A mistake in one raises an error that names its key.
 import re
 import string
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,11 @@ from groundstation.base.signals import RAW_PREFIX
 from groundstation.readers.profile import Profile
 from groundstation.readers.profile_columns import ColumnChecker
 from groundstation.readers.profile_times import TimeChecker
-from groundstation.readers.profile_values import Checker, read_table
+from groundstation.readers.profile_values import Checker, profile_text, table_of
 
 SHIPPED = Path(__file__).parent / "profiles"
 MOST_WIDTHS = 10_000
+_DOUBT = re.compile(r"(?:^|\s)#\s(?:.*;\s)?\?\s(?P<doubt>.*\S)")
 
 
 def shipped() -> tuple[Profile, ...]:
@@ -32,17 +34,28 @@ def load(path: Path) -> Profile:
     SettingsError
         Naming the file and the key: not TOML, an unknown key, unit, field or method, a wrong dimension ...
     """
-    path = known_as(path)
-    return _ProfileChecker(path).profile(read_table(path))
+    text = profile_text(path)
+    return replace(_ProfileChecker(path).profile(table_of(text, path)), doubts=doubts_of(text))
 
 
-def known_as(path: Path) -> Path:
-    """Return the path of a profile: of a shipped one where its name is given.
+def doubts_of(text: str) -> tuple[str, ...]:
+    """Return the question marks that a draft still has, ``# ? ...`` and ``; ? ...``.
 
-    A file of that name comes first.
+    Examples
+    --------
+    >>> doubts_of('"Alt" = { field = "gnss.altitude_msl_m", unit = "m" }  # 1 to 9; ? m assumed\\n"a" = 1  # why?\\n')
+    ('Alt: m assumed',)
+    >>> doubts_of("# ? names no zone\\n[time]  # dates\\n")
+    ('names no zone',)
     """
-    shipped_path = SHIPPED / f"{path.name.replace('-', '_')}.toml"
-    return shipped_path if not path.exists() and len(path.parts) == 1 and shipped_path.exists() else path
+    found = ((line, match) for line in text.splitlines() if (match := _DOUBT.search(line)))
+    return tuple(_key_of(line[: match.start()]) + match["doubt"] for line, match in found)
+
+
+def _key_of(before: str) -> str:
+    """Return the key of a line, and a colon; nothing of a line that is all comment."""
+    key = before.partition(" = ")[0].strip(" []\"'")
+    return f"{key}: " if key else ""
 
 
 class _ProfileChecker(Checker):

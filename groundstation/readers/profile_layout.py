@@ -65,6 +65,9 @@ def layout_of(
     if missing:
         text = f"profile {profile.name} names columns that are not there: {_with_nearest(fit, missing)}"
         fed.remarks.append(Remark("missing_columns", text))
+    twice = dict.fromkeys(name for rule in found for name in rule.names if fit.names.count(name) > 1)
+    if twice:
+        fed.remarks.append(Remark("duplicate_column", f"{', '.join(twice)}: more than one column; the first is taken"))
     derivations = [*fed.derivations, *_derivations(fit, fed)]
     rules = [*fed.rules.values(), *_raw(fit, fed.rules.values(), derivations, time)]
     decimal_comma = uses_decimal_comma(fit.first_rows, fit.delimiter)

@@ -10,14 +10,14 @@ import os
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.plug_ins import load_plug_ins
 from groundstation.readers.profile import Profile
-from groundstation.readers.profile_file import load
+from groundstation.readers.profile_file import SHIPPED, load, shipped
 
 ENTRY_POINT_GROUP = "groundstation.profiles"
 READER = "csv-profile"  # that of all profiles; its title has the profile's name behind
@@ -43,12 +43,19 @@ def user_folder() -> Path:
     return base / "groundstation" / "profiles"
 
 
-@cache
 def other_profiles() -> OtherProfiles:
-    """Load the profiles of the user's folder and of plug-ins; the first of a name counts."""
+    """Load the profiles of the user's folder and of plug-ins; the first of a name counts.
+
+    They are loaded again when a file of the folder has come, gone or changed.
+    """
+    return _loaded(user_folder(), _state_of(user_folder()))
+
+
+@lru_cache(maxsize=1)
+def _loaded(folder: Path, _state: tuple[object, ...]) -> OtherProfiles:
     found: dict[str, Profile] = {}
     failures: list[str] = []
-    for path in _files(user_folder()):
+    for path in _files(folder):
         failures += filter(None, [_taken(path, found)])
 
     def take(offered: Any) -> str:
@@ -56,6 +63,31 @@ def other_profiles() -> OtherProfiles:
 
     failures += load_plug_ins(ENTRY_POINT_GROUP, "profile", take)
     return OtherProfiles(tuple(found.values()), tuple(failures))
+
+
+def known_profiles() -> tuple[Profile, ...]:
+    """List the profiles that are tried on every table: those of others before ours."""
+    others = other_profiles().profiles
+    taken = {profile.name for profile in others}
+    return (*others, *(profile for profile in _shipped() if profile.name not in taken))
+
+
+@cache
+def _shipped() -> tuple[Profile, ...]:
+    return shipped()
+
+
+def known_as(path: Path) -> Path:
+    """Return the path of a profile; a name is that of another's, or of a shipped one.
+
+    A file of that name comes first.
+    """
+    if len(path.parts) != 1 or path.exists():
+        return path
+    names = ((one.path, one.name) for one in other_profiles().profiles)
+    other = next((found for found, name in names if path.name in (name, found.stem, found.name)), None)
+    shipped_path = SHIPPED / f"{path.name.replace('-', '_')}.toml"
+    return other or (shipped_path if shipped_path.exists() else path)
 
 
 def path_of_profile(reader: str) -> Path | None:
@@ -100,6 +132,18 @@ def _named(offered: Any) -> Iterator[Path]:
             yield from _named(one)
     else:
         raise TypeError("names no TOML file, folder or module")
+
+
+def _state_of(folder: Path) -> tuple[object, ...]:
+    """Return names, sizes and times of the files of a folder."""
+    state = list[object]()
+    for path in _files(folder):
+        try:
+            found = path.stat()
+        except OSError:
+            continue
+        state.append((str(path), found.st_size, found.st_mtime_ns))
+    return tuple(state)
 
 
 def _files(folder: Path) -> list[Path]:

@@ -11,16 +11,31 @@ from groundstation.base.units import factor_to, units_of
 from groundstation.readers.profile import ColumnRule
 
 
-def read_table(path: Path) -> dict[str, Any]:
-    """Read the TOML of a profile without checks.
+def profile_text(path: Path) -> str:
+    """Read the text of a profile.
 
     Raises
     ------
     SettingsError
-        When it cannot be read or is no TOML.
+        When it cannot be read.
     """
-    text = toml_text(path, str(path), "a profile", "check the path")
+    return toml_text(path, str(path), "a profile", "check the path")
+
+
+def table_of(text: str, path: Path) -> dict[str, Any]:
+    """Return the TOML of a profile without checks.
+
+    Raises
+    ------
+    SettingsError
+        When it is no TOML.
+    """
     return toml_table(text, str(path), "a profile as docs/profiles.md describes")
+
+
+def read_table(path: Path) -> dict[str, Any]:
+    """Read the TOML of a profile without checks."""
+    return table_of(profile_text(path), path)
 
 
 class Checker:

@@ -34,7 +34,7 @@ from groundstation.readers import (
     ulog,
 )
 from groundstation.readers.compressed import COMPRESSIONS, compression_of
-from groundstation.readers.profile_sources import other_profiles
+from groundstation.readers.profile_sources import known_profiles, other_profiles
 from groundstation.readers.source import Claim, Reader, Source
 
 if TYPE_CHECKING:
@@ -294,7 +294,7 @@ def _unclaimed(
     if with_advice and not magic.is_binary(source):
         from groundstation.readers.drafts.nearest import advice_on
 
-        advice = advice_on(source, csv_profile.known_profiles(), flat_csv.PAGE)
+        advice = advice_on(source, known_profiles(), flat_csv.PAGE)
         if advice is not None:
             more = f" ({'; '.join(troubles)})" if troubles else ""
             return UnclaimedLogError(source.name, advice.found + more, "", advice.next_step)

@@ -65,6 +65,8 @@ def _of_week(rule: TimeRule, texts: Sequence[Any], weeks: WeekCount) -> TableCel
     is_week = (number >= 0.0) & (number < _MOST_WEEKS) & (number == np.floor(number))
     is_second = second.column.mask & (second.column.values >= 0) & (second.column.values < _MOST_WEEK_NS)
     present = is_week & is_second
+    if rule.weeks:
+        number[present] += weeks.rollovers(number[present])
     number[present] += weeks.to_add(number[present].astype(np.int64), second.column.values[present])
     whole_ms, rest_ns = np.divmod(np.where(present, second.column.values, 0), 1_000_000)
     utc_ns = gps_week_to_utc_ns(np.where(present, number, 0.0).astype(np.int64) + rule.weeks, whole_ms) + rest_ns

@@ -287,6 +287,9 @@ class FixedSource(MadeSource):
     def _parted(self, lines: bytes) -> Iterator[bytes]:
         """Yield lines with a tab between the columns."""
         bounds = (0, *np.cumsum(self.widths)[:-1].tolist())
+        if not lines.isascii():  # a character may have several bytes
+            yield from (_parted_characters(line, bounds) for line in io.BytesIO(lines))
+            return
         most = len(lines) + lines.count(b"\n") * len(bounds)
         if len(lines) < COMPILED_BYTES or most > _MOST_BYTES or not lines.endswith(b"\n"):
             yield from (_parted_line(line, bounds) for line in io.BytesIO(lines))
@@ -307,6 +310,16 @@ def _parted_line(line: bytes, bounds: Sequence[int]) -> bytes:
         bounds = [at for at in bounds if at < len(content)]
     cells = [content[at:end] for at, end in zip(bounds, (*bounds[1:], None), strict=True)]
     return b"\t".join(cells) + line[len(content) :]
+
+
+def _parted_characters(line: bytes, bounds: Sequence[int]) -> bytes:
+    """Return a line with a tab before each column, of widths in characters of UTF-8.
+
+    A byte that is none of UTF-8 counts as a character: those of cp1251 are.
+    """
+    text = line.decode("utf-8", errors="surrogateescape")
+    places = [len(text[:at].encode("utf-8", errors="surrogateescape")) for at in bounds]
+    return _parted_line(line, places)
 
 
 @in_place

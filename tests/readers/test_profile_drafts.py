@@ -16,7 +16,7 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.pipeline.one_flight.resume import Keys, keys_of
 from groundstation.pipeline.verbs.profiles import findings_of, new_profile, try_profile
-from groundstation.readers import csv_profile, profile_sources, registry
+from groundstation.readers import profile_sources, registry
 from groundstation.readers.drafts.words import meaning_of
 from groundstation.readers.profile_file import load
 from tests.conftest import forget_profiles
@@ -311,7 +311,7 @@ def test_a_table_that_nothing_claims_gets_the_names_it_needs(write: Write) -> No
 
 
 def test_the_nearest_profile_and_what_is_missing_are_told(write: Write) -> None:
-    g5 = next(one for one in csv_profile.known_profiles() if one.name == "garmin-g5")
+    g5 = next(one for one in profile_sources.known_profiles() if one.name == "garmin-g5")
     gone = g5.time.columns[0]
     names = [name for name in dict.fromkeys((*g5.time.columns, *(rule.name for rule in g5.columns))) if name != gone]
     table = write("a.csv", "\n".join([",".join(names), *[",".join(["1.5"] * len(names))] * 3]) + "\n")

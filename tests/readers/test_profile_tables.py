@@ -13,6 +13,7 @@ from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.survey import survey
 from groundstation.readers import cells, csv_profile, dms, profile_file, registry, row_shapes, rows, spaced
+from groundstation.readers.profile_sources import known_as
 from groundstation.readers.row_shapes import cell_places, shape_of
 from groundstation.readers.source import Source
 from groundstation.readers.spaced import SpacedSource
@@ -465,10 +466,10 @@ def test_a_mistake_names_its_key(tmp_path: Path, text: str, key: str) -> None:
 
 
 def test_a_shipped_profile_is_known_by_its_name(tmp_path: Path) -> None:
-    assert profile_file.load(Path("garmin-g5")).name == "garmin-g5"
+    assert profile_file.load(known_as(Path("garmin-g5"))).name == "garmin-g5"
     own = tmp_path / "garmin-g5"
     own.write_text(f"{BASIC}{HDOP}")
-    assert profile_file.load(own).name == "p"
+    assert profile_file.load(known_as(own)).name == "p"
 
 
 def test_a_block_that_ends_inside_a_line_loses_no_row(tmp_path: Path) -> None:

@@ -27,8 +27,7 @@ from groundstation.pipeline.one_flight.configuration import ISOLATION, Configura
 from groundstation.pipeline.one_flight.identity import plain_id
 from groundstation.pipeline.one_flight.log import as_log, digest_of
 from groundstation.pipeline.one_flight.sealing import spoiled_files
-from groundstation.readers.profile_file import known_as
-from groundstation.readers.profile_sources import path_of_profile
+from groundstation.readers.profile_sources import known_as, path_of_profile
 from groundstation.reports.flight_report import PDF, REPORT
 from groundstation.results.document import SummaryDocument
 from groundstation.results.file_names import ARRAYS, SUMMARY, TABLES

@@ -13,7 +13,8 @@ from groundstation.readers.drafts.checked import check_profile
 from groundstation.readers.drafts.draft import Draft as Draft
 from groundstation.readers.drafts.draft import draft_of, facts_of
 from groundstation.readers.profile import Profile
-from groundstation.readers.profile_file import SHIPPED, known_as
+from groundstation.readers.profile_file import SHIPPED
+from groundstation.readers.profile_sources import known_as
 from groundstation.readers.source import Source
 from groundstation.results.files import write_text
 
@@ -61,10 +62,10 @@ def try_profile(profile: Path, table: Path) -> ProfileCheck:
 
 def known_profiles() -> tuple[tuple[KnownProfile, ...], tuple[str, ...]]:
     """Return the profiles tried on every table, and a line for each that cannot be used."""
-    from groundstation.readers import csv_profile
+    from groundstation.readers.profile_sources import known_profiles as tried_profiles
     from groundstation.readers.profile_sources import other_profiles
 
-    found = tuple(KnownProfile(one.name, one.description, _origin(one)) for one in csv_profile.known_profiles())
+    found = tuple(KnownProfile(one.name, one.description, _origin(one)) for one in tried_profiles())
     return found, other_profiles().failures
 
 
@@ -77,7 +78,10 @@ def findings_of(check: ProfileCheck) -> tuple[Finding, ...]:
     missing = (Finding("warn", "profile.missing_column", one.text) for one in check.missing)
     causes = (Finding("warn", "profile.unread_column", one) for one in check.causes)
     lost = map(damage_finding, check.damages)
-    told = (Finding("info", f"reader.{one.code}", one.text, one.topic) for one in check.remarks)
+    told = (
+        Finding("warn" if one.code == "unchecked_draft" else "info", f"reader.{one.code}", one.text, one.topic)
+        for one in check.remarks
+    )
     return (*missing, *causes, *lost, *told)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 _SHARE = 0.5  # of the cells, which have one cause
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?")
 _DATE = re.compile(r"(\d{1,2})[/.-](\d{1,2})[/.-](\d{4}|\d\d)(?!\d)")
+_DAYS_OF_EXCEL = re.compile(r"[34]\d{4}(?:[.,]\d+)?")  # 1982 to 2036
 _EXCEL = re.compile(r"\d{1,2}:\d\d[.,]\d{1,3}")
 _CLOCK = re.compile(r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d*)?)?(?: ?[AaPp]\.?[Mm]\.?)?")
 _COMMA = re.compile(r"[+-]?\d+,\d+")
@@ -15,6 +16,7 @@ _DMS = re.compile(
     r"(?:['′:m ]\s*(?:\d{1,2}(?:\.\d*)?\s*[\"″s]?)?)?\s*[NSEWnsew]?"
 )
 _SIDE = re.compile(r"[NSEWnsew]\s*\d{1,3}(?:\.\d*)?|\d{1,3}(?:\.\d*)?\s*°?\s*[NSEWnsew]")
+_RUN_TOGETHER = re.compile(r"[NSEWnsew]\s*\d{4,5}\.\d+|\d{4,5}\.\d+\s*[NSEWnsew]")
 _WITH_UNIT = re.compile(r"[+-]?\d+(?:\.\d*)?\s*[A-Za-z°%/²]+[A-Za-z0-9/^²]*")
 _MISSING_WORDS = frozenset(
     ("n/a", "na", "null", "none", "nil", "inv", "invalid", "no data", "nodata", "no fix", "unknown", "#value!", "#n/a")
@@ -65,6 +67,17 @@ def are_angles(cells: Sequence[str]) -> bool:
     )
 
 
+def are_run_together(cells: Sequence[str]) -> bool:
+    """Tell whether cells are degrees and minutes run together, with a letter.
+
+    Examples
+    --------
+    >>> are_run_together(["5530.1200N", "S 00102.5"]), are_run_together(["030.5E"])
+    (True, False)
+    """
+    return bool(cells) and all(_RUN_TOGETHER.fullmatch(cell.strip()) for cell in cells)
+
+
 def cause_of_times(cells: Sequence[str]) -> str:
     """Return why times cannot be read, with an example; empty where no cause is known.
 
@@ -95,6 +108,11 @@ def cause_of_times(cells: Sequence[str]) -> str:
     }
     if order := date_order(cells):
         return f'{orders[order]}: read them by kind = "local" with date_formats, or write them as 2026-05-04 12:00:00'
+    if _most(cells, _DAYS_OF_EXCEL.fullmatch):
+        return (
+            f"days since 1900, such as {example}, as Excel counts them: show them as yyyy-mm-dd hh:mm:ss.000 and save "
+            "again"
+        )
     if _most(cells, _CLOCK.fullmatch):
         return f'times of day without a date, such as {example}: read them by kind = "time_of_day", or add the date'
     if _most(cells, _COMMA.fullmatch):

@@ -19,7 +19,7 @@ from groundstation.readers.drafts.time_guess import (
     moves,
     rank_of,
 )
-from groundstation.readers.drafts.words import TIME_WORDS, in_brackets
+from groundstation.readers.drafts.words import TIME_WORDS, in_brackets, words_of
 
 _SINCE_1970 = {"s": (8e8, 4e9), "ms": (8e11, 4e12), "us": (8e14, 4e15), "ns": (8e17, 4e18)}
 _WEEK_S = 604_800.0
@@ -89,6 +89,24 @@ def of_numbers(sample: TableSample) -> Iterator[TimeGuess]:
         lines = (f'kind = "{"unix" if since else "seconds"}"', f"column = {quoted(name)}", f'unit = "{unit}"')
         rank = rank_of(sample, at) + (bool(since) if is_named else -2)  # seconds since 1970 need no zone
         yield TimeGuess((at,), lines, why, values * SECONDS[unit], bool(since), doubt, rank)
+
+
+def of_fractions(sample: TableSample, utc: TimeGuess) -> Iterator[TimeGuess]:
+    """Yield columns that count the fraction of the second of a time in whole seconds."""
+    for at, name in enumerate(sample.names):
+        values = sample.numbers(at)
+        known = values[np.isfinite(values)]
+        is_taken = at in utc.columns or (sample.meanings[at] is not None and sample.meanings[at].role != "time")  # type: ignore[union-attr]
+        if is_taken or not sample.is_of_numbers(at) or known.min() < 0.0 or known.max() <= 0.0:
+            continue
+        told = next(filter(None, map(TIME_WORDS.get, (*words_of(name), *map(str.lower, in_brackets(name))))), "")
+        unit = (
+            told if told in ("ms", "us", "ns") else "s" if known.max() < 1.0 else "ms" if known.max() < 1000.0 else ""
+        )
+        seconds = utc.seconds + values * SECONDS.get(unit, np.nan)
+        if unit and known.max() * SECONDS[unit] < 1.0 and moves(seconds):
+            lines = ('kind = "seconds"', f"column = {quoted(name)}", f'unit = "{unit}"')
+            yield TimeGuess((at,), lines, "", seconds, False, rank=utc.rank)
 
 
 def _unit_by(told: str, known: FloatArray, step: float) -> tuple[str, str]:

@@ -13,7 +13,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.signals import Field, field_of
 from groundstation.base.units import CONVERSIONS, MPS2_PER_G
 from groundstation.readers.drafts.axes import turned
-from groundstation.readers.drafts.causes import are_angles, cause_of_numbers
+from groundstation.readers.drafts.causes import are_angles, are_run_together, cause_of_numbers
 from groundstation.readers.drafts.column import ColumnGuess, both
 from groundstation.readers.drafts.motion import Motion, motion_of
 from groundstation.readers.drafts.positions import degrees_of, in_unit, is_pair, pair_of
@@ -84,6 +84,8 @@ class Guesses:
         if known.kind == "bool":
             is_flag = {cell.lower() for cell in sample.filled(at)} <= _FLAGS
             return replace(left, target=meaning.target) if is_flag else left
+        if known.unit == "deg" and are_run_together(sample.filled(at)):
+            return replace(left, target=meaning.target, sign=meaning.sign, unit="ddmm")
         if known.unit == "deg" and are_angles(sample.filled(at)):
             return replace(left, target=meaning.target, sign=meaning.sign, unit="dms")
         if not sample.is_of_numbers(at):
@@ -211,6 +213,9 @@ class Guesses:
         if name == "true_heading_deg" and "true" not in words_of(guess.name):
             guess = replace(guess, doubt=both(guess.doubt, "true north assumed"))
         has_variation = any(one is not None and one.role == "variation" for one in self._sample.meanings)
+        meaning = self._sample.meanings[guess.at]
+        if name == "track_deg" and meaning is not None and meaning.is_magnetic:
+            return replace(guess, north="magnetic", why=guess.why or "from magnetic north by its header")
         if name == "magnetic_heading_deg" and has_variation and "ins.true_heading_deg" not in self._by_target:
             return replace(guess, target="ins.true_heading_deg", north="magnetic")
         return guess

@@ -43,7 +43,7 @@ def degrees_of(sample: TableSample, guess: ColumnGuess) -> FloatArray:
         values = np.where(read.column.mask, read.column.values, np.nan) * guess.sign
     else:
         factor = CONVERSIONS[guess.unit][1] if guess.unit in CONVERSIONS else np.nan
-        values = sample.numbers(guess.at) * factor * guess.scale * guess.sign
+        values = (sample.numbers(guess.at) * guess.scale * guess.sign + guess.offset) * factor
     if not guess.side:
         return values
     minus = _SIDES[guess.target.rpartition(".")[2]][1]
@@ -73,6 +73,11 @@ def _in_unit(sample: TableSample, guess: ColumnGuess, other: ColumnGuess | None,
                 return replace(guess, unit="rad", doubt="radians, as the angles")
             return replace(guess, unit="deg", doubt="degrees assumed: they may be radians")
         return replace(guess, unit="deg", doubt="" if is_told else "degrees assumed")
+    if most == 180.0 and largest <= 360.0 and other is not None and _largest(sample, other) <= 90.0:
+        values = sample.numbers(guess.at)
+        if np.nanmin(values) > 180.0:
+            return replace(guess, unit="deg", offset=-360.0, why="counts from 0 to 360")
+        return replace(guess, unit="deg", doubt="counts from 0 to 360: beyond 180 it is none that is read")
     if largest > 1e5 and largest <= most * 1e7:
         return replace(guess, unit="deg1e7")
     both = [one for one in (guess, other) if one is not None]

@@ -37,6 +37,7 @@ _OF_SHIPS = {
     "track_deg": 360.0,
     "ground_speed_mps": 102.3,
 }
+_PLACES = ("latitude_deg", "longitude_deg")
 _FIRST_LINES, _MOST_BEHIND = 2000, 10
 _WINDOWS, _WINDOW_BYTES = 8, 32 << 10  # later pieces of the file that are looked at
 _MOST_ROWS = 1000  # of each piece
@@ -224,8 +225,28 @@ def _spaced(source: Source, encoding: str) -> "tuple[Source, list[HeadLine], _Sh
     """Return a table whose cells are parted by blanks, with tabs for them, or None."""
     seen = SpacedSource(source.path, source)
     lines = head_lines(seen, encoding, _FIRST_LINES)
+    cells, joined = _parts_of_angles([_cells(line.text, "\t") for line in lines[:300]])
+    if joined:
+        seen = SpacedSource(source.path, source, cells, joined)
+        lines = head_lines(seen, encoding, _FIRST_LINES)
     shape = _Shape.of(lines, "\t")
     return None if shape is None or shape.first_row is None or shape.share < ENOUGH / 2 else (seen, lines, shape)
+
+
+def _parts_of_angles(rows: Sequence[Sequence[str]]) -> tuple[int, tuple[int, ...]]:
+    """Return cells of a row, and gaps between parts of degrees, minutes and seconds.
+
+    A latitude or longitude has three cells below its name; 0 and no gaps where the names do not tell that.
+    """
+    counts = Counter(len(row) for row in rows if len(row) > 1 and _is_row(row))
+    cells = max(counts, key=lambda count: counts[count], default=0)
+    first = next((at for at, row in enumerate(rows) if len(row) == cells and _is_row(row)), 0)
+    for row in rows[max(0, first - _MOST_BEHIND) : first]:
+        meanings = [meaning_of(name.lstrip("# ")) for name in row[:500]]
+        places = [at for at, one in enumerate(meanings) if one is not None and one.field in _PLACES]
+        if places and len(row) + 2 * len(places) == cells:
+            return cells, tuple(at + 2 * number + more for number, at in enumerate(places) for more in (0, 1))
+    return 0, ()
 
 
 @dataclass(frozen=True)

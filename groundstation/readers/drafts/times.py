@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from groundstation.readers.days import day_ns
 from groundstation.readers.drafts.causes import cause_of_times, date_order
 from groundstation.readers.drafts.clocks import DATE_AND_CLOCK, are, clock_seconds, date_formats, is_clock, is_day
 from groundstation.readers.drafts.column import both
-from groundstation.readers.drafts.counters import of_numbers, of_week
+from groundstation.readers.drafts.counters import of_fractions, of_numbers, of_week
 from groundstation.readers.drafts.sample import ENOUGH, TableSample
 from groundstation.readers.drafts.time_guess import NAMED, PRIME, TimeGuess, moves, rank_of
 
@@ -44,26 +45,30 @@ def time_of(sample: TableSample) -> TimeGuess:
         raise UnreadableLogError(sample.name, *_no_time(sample))
     found += [*_of_both(sample, found)]
     fine = [one for one in found if one.own >= PRIME] or found
-    return max(fine, key=lambda one: (one.is_absolute, one.rank, one.own))
+    best = max(fine, key=lambda one: (one.is_absolute, one.rank, one.own))
+    repeats = "" if best.own >= PRIME else "rows repeat the time of others: no column tells the fraction of the second"
+    return replace(best, doubt=both(best.doubt, repeats))
 
 
 def _of_both(sample: TableSample, found: list[TimeGuess]) -> Iterator[TimeGuess]:
     """Yield UTC in whole seconds together with a counter that tells the rows apart."""
     utc = next((one for one in found if one.is_absolute and one.own < PRIME), None)
-    counter = next((one for one in found if not one.is_absolute and one.own >= PRIME), None)
-    if utc is None or counter is None or any(one.is_absolute and one.own >= PRIME for one in found):
+    if utc is None or any(one.is_absolute and one.own >= PRIME for one in found):
         return
-    of_utc = [line.replace("column =", "utc =") for line in utc.lines[1:] if not line.startswith("offset")]
-    of_counter = [line.replace("column =", "counter =") for line in counter.lines[1:]]
-    yield TimeGuess(
-        (*counter.columns, *utc.columns),
-        ('kind = "utc_counter"', *of_counter, *of_utc),
-        f"{utc.why}, in whole seconds, beside a counter",
-        counter.seconds,
-        True,
-        "; ".join(filter(None, (utc.doubt, counter.doubt))),
-        counter.rank + 1,
-    )
+    counters = [one for one in found if not one.is_absolute and one.own >= PRIME]
+    for counter in counters[:1] or of_fractions(sample, utc):
+        of_utc = [line.replace("column =", "utc =") for line in utc.lines[1:] if not line.startswith("offset")]
+        of_counter = [line.replace("column =", "counter =") for line in counter.lines[1:]]
+        yield TimeGuess(
+            (*counter.columns, *utc.columns),
+            ('kind = "utc_counter"', *of_counter, *of_utc),
+            f"{utc.why}, in whole seconds, beside a {'counter' if counters else 'fraction of the second'}",
+            counter.seconds,
+            True,
+            both(utc.doubt, counter.doubt),
+            counter.rank + 1,
+        )
+        return
 
 
 def _no_time(sample: TableSample) -> tuple[str, str, str]:

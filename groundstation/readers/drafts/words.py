@@ -11,6 +11,7 @@ from types import MappingProxyType
 
 _IN_BRACKETS = re.compile(r"\(([^()]*)\)|\[([^\[\]]*)\]|\{([^{}]*)\}")
 _CAMEL = re.compile(r"(?<=[a-zа-я0-9])(?=[A-ZА-Я])|(?<=[A-Z])(?=[A-Z][a-z])")
+_MAGNETIC = re.compile(r"[\[({]?(?:deg(?:rees)?|°)?[ .,_]*(?:m|mag|magn|magnetic)[\])}]?", re.IGNORECASE)
 _SQUARED = re.compile(r"([a-zA-Z]+)(?:\^?2|²)")  # m^2
 _PARTING = re.compile(r"[^0-9A-Za-zА-Яа-яёЁ]+")
 MOST_CHARACTERS = 80  # of a name: a longer one is no name of a quantity
@@ -112,8 +113,8 @@ class Meaning:
     """Meaning of a name: the topic and field it feeds, and its sign.
 
     ``topic`` is that of a name which does not say GNSS or INS. ``unit`` and ``scale`` are those that the name tells.
-    ``is_variance``: the number is a square. ``role`` is ``time``, ``date``, ``clock``, ``week``, ``tow``,
-    ``variation``, ``key`` or empty for a field.
+    ``is_variance``: the number is a square. ``is_magnetic``: a direction counts from magnetic north. ``role`` is
+    ``time``, ``date``, ``clock``, ``week``, ``tow``, ``variation``, ``key`` or empty for a field.
     """
 
     topic: str = ""
@@ -123,6 +124,7 @@ class Meaning:
     unit: str = ""
     scale: float = 1.0
     is_variance: bool = False
+    is_magnetic: bool = False
 
     @property
     def target(self) -> str:
@@ -357,7 +359,10 @@ def meaning_of(name: str, units: tuple[str, ...] = ()) -> Meaning | None:
             field = found.field
             if (topic, field) == ("ins", "true_heading_deg") and is_gnss and not is_ins:
                 topic, field = "gnss", "track_deg"  # what a receiver calls its heading
-            return replace(found, topic=topic, field=field)
+            is_magnetic = field in ("true_heading_deg", "track_deg") and any(map(_MAGNETIC.fullmatch, said))
+            if is_magnetic and field == "true_heading_deg":
+                field = "magnetic_heading_deg"
+            return replace(found, topic=topic, field=field, is_magnetic=is_magnetic)
     return None
 
 
