@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
+from groundstation.systems.inertial.alignment_analysis import GROUND
 from groundstation.systems.inertial.analysis import FORECAST, INERTIAL, UNITS
 from groundstation.systems.system import FleetTab, InFleet, Study, System, Tab
 
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 
 def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.chapters.chapter import Chapter
+    from groundstation.systems.inertial.alignment_answer import GroundResult
+    from groundstation.systems.inertial.alignment_chapter import ground
     from groundstation.systems.inertial.answer import InertialResult
     from groundstation.systems.inertial.chapter import SOURCES, inertial
     from groundstation.systems.inertial.forecast_answer import ForecastResult
@@ -25,6 +28,7 @@ def _chapters() -> "tuple[Chapter, ...]":
 
     return (
         Chapter((InertialResult,), inertial, sources=SOURCES),
+        Chapter((GroundResult,), ground),
         Chapter((UnitsResult,), units),
         Chapter((ForecastResult,), forecast, sources=SOURCES),
     )
@@ -113,7 +117,7 @@ def _outcome_units() -> type:
 
 SYSTEM = System(
     name="inertial",
-    analyses=(INERTIAL, FORECAST, UNITS),
+    analyses=(INERTIAL, FORECAST, UNITS, GROUND),
     studies=(
         Study(
             "forecast",
