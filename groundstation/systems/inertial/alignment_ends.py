@@ -13,6 +13,7 @@ from groundstation.systems.inertial.alignment_answer import (
     InsShutdown,
     StandingDrift,
 )
+from groundstation.systems.inertial.alignment_limits import standing_limit_mps2
 from groundstation.systems.inertial.alignment_slopes import (
     CIRCLE95,
     ROUNDED,
@@ -82,9 +83,12 @@ def standing_drift(
 def drift_limit_mps2(noise: InsNoise, waited_s: float, length_s: float) -> float:
     """Return the length of a velocity slope that an honest unit of a class hardly exceeds.
 
-    Of one axis: tilt x g, drift x g x the mean time since the alignment, and the walk of the velocity, whose fitted
+    Of a shipped class it is that of simulated stands. Of any other, for one axis: tilt x g, drift x g x the mean time since the alignment, and the walk of the velocity, whose fitted
     slope has the variance 6 q / (5 T).
     """
+    shipped = standing_limit_mps2(noise.name, length_s + 2.0 * waited_s)
+    if shipped is not None:
+        return shipped
     middle_s = waited_s + 0.5 * length_s
     drift_radps = RADPS_PER_DPH * float(np.hypot(noise.drift_dph, noise.random_drift_dph))
     parts = (

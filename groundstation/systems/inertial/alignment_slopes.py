@@ -11,7 +11,7 @@ from groundstation.systems.inertial.units_answer import Measured
 from groundstation.systems.inertial.units_growth import means_of
 
 CIRCLE95 = 2.447746830680816  # sigmas of one axis: radius that holds 95 % of a round normal distribution
-FEWEST_MEANS = 4
+FEWEST_MEANS = 5
 ROUNDED = float(1.0 / np.sqrt(12.0))
 LEAST_STEP = 1e-9
 STUDIED_STEPS = 4000
@@ -39,7 +39,7 @@ def length_of(north: AxisSlope, east: AxisSlope) -> Measured:
 def slopes_of(time_s: FloatArray, velocity_mps: FloatArray) -> tuple[AxisSlope, AxisSlope] | None:
     """Return the slope of both axes per second; None with too few means of ten seconds.
 
-    The sigma is that of the scatter of the means about the line, by Student's quantile, and of the rounding.
+    The sigma is that of the scatter of the means about a parabola, by Student's quantile, and of the rounding.
     """
     known = np.isfinite(velocity_mps).all(axis=1)
     mean_s, means = means_of(time_s[known], velocity_mps[known])
@@ -51,9 +51,9 @@ def slopes_of(time_s: FloatArray, velocity_mps: FloatArray) -> tuple[AxisSlope, 
     found = []
     for axis in range(2):
         slope = float(np.sum(centred * means[:, axis])) / spread
-        rest = means[:, axis] - np.mean(means[:, axis]) - slope * centred
+        rest = _beyond(centred, means[:, axis], 2)
         found.append(
-            AxisSlope(slope, _sigma(rest, 2, 1.0 / np.sqrt(spread), step_of(velocity_mps[known, axis]), length_s))
+            AxisSlope(slope, _sigma(rest, 3, 1.0 / np.sqrt(spread), step_of(velocity_mps[known, axis]), length_s))
         )
     return found[0], found[1]
 
@@ -68,8 +68,21 @@ def means_with_sigma(time_s: FloatArray, velocity_mps: FloatArray) -> tuple[Axis
     for axis in range(2):
         mean = float(np.mean(means[:, axis]))
         gain = 1.0 / np.sqrt(len(mean_s))
-        found.append(AxisSlope(mean, _sigma(means[:, axis] - mean, 1, gain, step_of(velocity_mps[known, axis]), 1.0)))
+        found.append(
+            AxisSlope(
+                mean,
+                _sigma(
+                    _beyond(mean_s - mean_s[0], means[:, axis], 1), 2, gain, step_of(velocity_mps[known, axis]), 1.0
+                ),
+            )
+        )
     return found[0], found[1]
+
+
+def _beyond(time_s: FloatArray, values: FloatArray, degree: int) -> FloatArray:
+    """Return what a polynomial leaves: a drift, and its bend, are no noise."""
+    design = np.vander(time_s / max(float(np.abs(time_s).max()), 1.0), degree + 1)
+    return np.asarray(values - design @ np.linalg.lstsq(design, values, rcond=None)[0])
 
 
 def _sigma(rest: FloatArray, fitted: int, gain: float, step: float, over: float) -> float:

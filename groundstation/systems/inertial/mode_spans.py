@@ -16,8 +16,8 @@ LEAST_ALIGNMENT_S = 5.0  # a mode that lasts for less is a flicker of the flag
 class ModeSpans:
     """Alignments by the logged mode: spans of flight seconds.
 
-    ``flicker`` counts those too short to be one. ``ended_s`` are the moments at which one of them gives way to navigation. ``is_logged``: the log has modes.
-    ``first_s``: time of the first.
+    ``flicker`` counts those too short to be one. ``ended_s`` are the moments at which one of them gives way to
+    navigation. ``is_logged``: the log has modes. ``first_s``: time of the first.
     """
 
     spans_s: tuple[tuple[float, float], ...]

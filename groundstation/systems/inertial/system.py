@@ -115,6 +115,18 @@ def _outcome_units() -> type:
     return UnitsOutcome
 
 
+def _study_ground() -> "Callable[..., StudyResult]":
+    from groundstation.systems.inertial.study.ground import study_ground
+
+    return study_ground
+
+
+def _outcome_ground() -> type:
+    from groundstation.systems.inertial.study.ground_runs import GroundOutcome
+
+    return GroundOutcome
+
+
 SYSTEM = System(
     name="inertial",
     analyses=(INERTIAL, FORECAST, UNITS, GROUND),
@@ -129,6 +141,12 @@ SYSTEM = System(
             "several INS of one flight: false alarms, faults found and named, coverage of the table's intervals",
             _study_units,
             _outcome_units,
+        ),
+        Study(
+            "ground",
+            "alignment and shutdown of an INS: coverage of tilt, azimuth, drift while standing and residual speed",
+            _study_ground,
+            _outcome_ground,
         ),
     ),
     chapters=_chapters,
