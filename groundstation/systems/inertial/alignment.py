@@ -74,6 +74,7 @@ def ground_result(flight: Flight, known: Known, settings: InertialSettings) -> G
     drift, why_not = _drift(time_s, velocity, motion, start_s, before.end_s, kind[0], noise)
     aligned_s = modes.first_s if before.end_s is None else before.end_s
     later = tuple(one for one in modes.spans_s if one[0] >= aligned_s - 1.0)
+    again = realignments_of(later, compared, _heading(known, ins, flight, motion, later), motion, start_s)
     return GroundResult(
         ins_topic=topic,
         gnss_topic="" if gnss is None else gnss.topic,
@@ -85,7 +86,7 @@ def ground_result(flight: Flight, known: Known, settings: InertialSettings) -> G
         standing=drift,
         standing_reason=why_not,
         shutdown=shutdown_of(time_s, velocity, motion, compared, noise, start_s, is_unaided=is_unaided),
-        realignments=realignments_of(later, compared, _heading(known, ins, flight, motion, later), motion, start_s),
+        realignments=tuple(one for one in again if one.is_aligned or is_unaided),
         mode_flicker=modes.flicker,
     )
 

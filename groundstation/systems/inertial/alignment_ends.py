@@ -83,8 +83,8 @@ def standing_drift(
 def drift_limit_mps2(noise: InsNoise, waited_s: float, length_s: float) -> float:
     """Return the length of a velocity slope that an honest unit of a class hardly exceeds.
 
-    Of a shipped class it is that of simulated stands. Of any other, for one axis: tilt x g, drift x g x the mean time since the alignment, and the walk of the velocity, whose fitted
-    slope has the variance 6 q / (5 T).
+    Of a shipped class it is that of simulated stands. Of any other, for one axis: tilt x g, drift x g x the mean time
+    since the alignment, and the walk of the velocity, whose fitted slope has the variance 6 q / (5 T).
     """
     shipped = standing_limit_mps2(noise.name, length_s + 2.0 * waited_s)
     if shipped is not None:

@@ -66,16 +66,9 @@ def means_with_sigma(time_s: FloatArray, velocity_mps: FloatArray) -> tuple[Axis
         return None
     found = []
     for axis in range(2):
-        mean = float(np.mean(means[:, axis]))
-        gain = 1.0 / np.sqrt(len(mean_s))
-        found.append(
-            AxisSlope(
-                mean,
-                _sigma(
-                    _beyond(mean_s - mean_s[0], means[:, axis], 1), 2, gain, step_of(velocity_mps[known, axis]), 1.0
-                ),
-            )
-        )
+        rest = _beyond(mean_s - mean_s[0], means[:, axis], 1)
+        sigma = _sigma(rest, 2, 1.0 / np.sqrt(len(mean_s)), step_of(velocity_mps[known, axis]), 1.0)
+        found.append(AxisSlope(float(np.mean(means[:, axis])), sigma))
     return found[0], found[1]
 
 

@@ -52,7 +52,7 @@ def slopes_while_standing(ins_class: str, stands: int) -> FloatArray:
 def limits_text(stands: int = STANDS) -> str:
     """Return the file of limits."""
     lines = [
-        "# Slope of the ground speed that honest units exceed in a share of stands after alignment, by class and length.",
+        "# Slope of the ground speed that honest units exceed in a share of stands, by class and length of the stand.",
         f"# {stands} simulated stands of a class, half with instruments of their own.",
         "# python -m groundstation.systems.inertial.study.ground_limits",
         f"alarm_share = {ALARM_SHARE}",
