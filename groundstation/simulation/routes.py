@@ -61,6 +61,11 @@ class RoutePlan:
 
 def draw_route(kind: RouteKind, time_s: FloatArray, rng: np.random.Generator) -> Route:
     """Draw a route of a kind over all of ``time_s``, shape (n,), evenly spaced."""
+    return fly_plan(draw_plan(kind, time_s, rng), time_s)
+
+
+def draw_plan(kind: RouteKind, time_s: FloatArray, rng: np.random.Generator) -> RoutePlan:
+    """Draw the plan of a route of a kind."""
     planners = {
         "straight": _straight,
         "norilsk_moscow": _norilsk_moscow,
@@ -70,7 +75,7 @@ def draw_route(kind: RouteKind, time_s: FloatArray, rng: np.random.Generator) ->
         "racetrack": _racetrack,
         "late_survey": _late_survey,
     }
-    return fly_plan(planners[kind](time_s, rng), time_s)
+    return planners[kind](time_s, rng)
 
 
 def fly_plan(plan: RoutePlan, time_s: FloatArray) -> Route:
@@ -104,7 +109,8 @@ def fly_plan(plan: RoutePlan, time_s: FloatArray) -> Route:
     return Route(motion, wrap_180(np.rad2deg(longitude)))
 
 
-def _ramp(time_s: FloatArray, start_s: float, length_s: float) -> FloatArray:
+def smooth_ramp(time_s: FloatArray, start_s: float, length_s: float) -> FloatArray:
+    """Return a smooth step from 0 to 1 over a length of time."""
     share = np.clip((time_s - start_s) / length_s, 0.0, 1.0)
     return np.asarray(share * share * (3.0 - 2.0 * share))
 
@@ -115,7 +121,7 @@ def turn_of(time_s: FloatArray, start_s: float, angle_deg: float, rate_dps: floa
     The angle is exact to the step.
     """
     length = max(abs(angle_deg) / rate_dps, BANK_RAMP_S)
-    shape = _ramp(time_s, start_s, BANK_RAMP_S) - _ramp(time_s, start_s + length, BANK_RAMP_S)
+    shape = smooth_ramp(time_s, start_s, BANK_RAMP_S) - smooth_ramp(time_s, start_s + length, BANK_RAMP_S)
     area = float(np.sum(shape)) * float(time_s[1] - time_s[0])
     scale = np.deg2rad(angle_deg) / length if area > 0.5 * length else 0.0
     return shape * scale, start_s + length + BANK_RAMP_S
@@ -130,9 +136,9 @@ def _climb_out(
 ) -> tuple[FloatArray, FloatArray]:
     """Return speed and altitude of a stand of 30 s, a take-off run, climb and acceleration."""
     climb_s = 1.5 * (cruise_m - field_m) / climb_mps
-    speed = lift_off_mps * _ramp(time_s, 30.0, ROLL_S)
-    speed += (cruise_mps - lift_off_mps) * _ramp(time_s, 30.0 + ROLL_S, 0.7 * climb_s)
-    return speed, field_m + (cruise_m - field_m) * _ramp(time_s, 30.0 + ROLL_S, climb_s)
+    speed = lift_off_mps * smooth_ramp(time_s, 30.0, ROLL_S)
+    speed += (cruise_mps - lift_off_mps) * smooth_ramp(time_s, 30.0 + ROLL_S, 0.7 * climb_s)
+    return speed, field_m + (cruise_m - field_m) * smooth_ramp(time_s, 30.0 + ROLL_S, climb_s)
 
 
 def _straight(time_s: FloatArray, rng: np.random.Generator) -> RoutePlan:
@@ -180,9 +186,11 @@ def _norilsk_moscow(time_s: FloatArray, rng: np.random.Generator) -> RoutePlan:
     ]
     cruise = float(np.clip((to_fly_m - lengths[0]) / (lengths[1] - lengths[0]), 120.0, 240.0))  # length is linear in it
     speed, altitude = _climb_out(time_s, field_m, cruise_m, 75.0, cruise, 10.0)
-    speed -= (cruise - 95.0) * _ramp(time_s, end - APPROACH_S, 500.0)
-    speed -= 95.0 * _ramp(time_s, end - 70.0, 50.0)
-    altitude = altitude - (cruise_m - field_m - 10.0) * _ramp(time_s, end - APPROACH_S - 300.0, APPROACH_S + 200.0)
+    speed -= (cruise - 95.0) * smooth_ramp(time_s, end - APPROACH_S, 500.0)
+    speed -= 95.0 * smooth_ramp(time_s, end - 70.0, 50.0)
+    altitude = altitude - (cruise_m - field_m - 10.0) * smooth_ramp(
+        time_s, end - APPROACH_S - 300.0, APPROACH_S + 200.0
+    )
     runway, turn, at = 13.0 + 180.0 * rng.integers(2), np.zeros(len(time_s)), 110.0
     for angle in rng.choice([-1.0, 1.0]) * np.array([60.0, -40.0]) + rng.uniform(-15.0, 15.0, 2):
         part, at = turn_of(time_s, at, angle, _rate_dps(18.0, float(np.interp(at, time_s, speed))))

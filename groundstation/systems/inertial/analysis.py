@@ -66,7 +66,7 @@ def _examine(flight: "Flight", known: Known, settings: InertialSettings) -> tupl
 
 
 def _gives(flight: "Flight", known: Known, settings: InertialSettings) -> tuple[str, ...]:
-    from groundstation.systems.inertial.examine import given_by
+    from groundstation.systems.inertial.gives import given_by
 
     return given_by(flight, known, settings)
 

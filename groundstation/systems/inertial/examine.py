@@ -11,7 +11,6 @@ from groundstation.systems.analysis import Shortfall
 from groundstation.systems.inertial.differences import InsDifferences, differences
 from groundstation.systems.inertial.kind import LEAST_AIDED_S, WHY_NOT, kind_of, stated_kind
 from groundstation.systems.inertial.settings import InertialSettings
-from groundstation.systems.inertial.units_findings import told_by_units
 from groundstation.systems.known import Known
 from groundstation.tables.gaps import seconds_covered
 from groundstation.tables.sources import AIDED, UNAIDED, said_of
@@ -90,11 +89,6 @@ def examine_inertial(flight: Flight, known: Known, settings: InertialSettings) -
         text = f"{covered_s / 60.0:.0f} min with GNSS; one Schuler period ({settings.schuler_fit_s / 60.0:.1f} min) "
         found.append(Shortfall(text + "is needed to separate tilt from drift: until then sigmas depend on the class"))
     return tuple(found)
-
-
-def given_by(flight: Flight, _known: Known, _settings: InertialSettings) -> tuple[str, ...]:
-    """Return what a log gives beside the errors of one INS, a line each."""
-    return told_by_units(flight)
 
 
 def _longest_outages(time_s: np.ndarray, gnss_s: np.ndarray, least_s: float) -> tuple[tuple[float, float], ...]:

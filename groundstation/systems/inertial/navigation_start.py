@@ -14,12 +14,12 @@ from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.methods.ins_noise import GnssNoise
 from groundstation.systems.inertial.answer import NavigationStart
-from groundstation.systems.inertial.differences import UNUSED_MODES, InsDifferences
+from groundstation.systems.inertial.differences import InsDifferences
+from groundstation.systems.inertial.mode_spans import mode_spans
 from groundstation.tables.sources import said_of
 from groundstation.tables.table import Flight
 
 NAV_START = "nav_start_utc"  # key of a log's head and of the aircraft file
-ALIGN = "align"
 STAND_S = 30.0  # a standstill is looked for so long
 LEAST_STAND_S = 5.0
 COMPARED_S = 10.0  # positions are means over so long
@@ -80,7 +80,7 @@ def navigation_start(
     findings : tuple of Finding
         A stated start that cannot be used; alignments after the start.
     """
-    began_s = _alignments_ended_s(flight, compared.ins_topic)
+    began_s = np.array(mode_spans(flight, compared.ins_topic).ended_s, dtype=np.float64)
     found, findings = _by_statement(flight, compared, stated)
     if found is None:
         found = _by_standstill(compared, gnss)
@@ -115,15 +115,6 @@ def _by_statement(
         text = f"start of navigation stated by {stated.by} ({NAV_START} = {stated.utc}) is not used: {why_not}"
         return None, (Finding("warn", "inertial.nav_start", text, compared.ins_topic),)
     return NavigationStart(start_s, "stated", f"{stated.by} says {stated.utc}"), ()
-
-
-def _alignments_ended_s(flight: Flight, topic: str) -> FloatArray:
-    """Flight seconds at which a logged mode changes from alignment to navigation, shape (k,)."""
-    ins = flight[topic].unique_times()
-    mode = ins.text("mode")
-    mode, time_ns = mode[mode != ""], ins.time_ns[mode != ""]
-    ended = np.flatnonzero(~np.isin(mode[1:], UNUSED_MODES) & (mode[:-1] == ALIGN)) + 1
-    return np.asarray(flight.seconds(time_ns[ended]), dtype=np.float64)
 
 
 def _by_standstill(compared: InsDifferences, gnss: GnssNoise) -> NavigationStart:

@@ -14,6 +14,7 @@ from groundstation.plots.marks import AnyMark, Band, Curve, Dots, Floats, Limit,
 from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import finite, padded, symmetric
 from groundstation.results.flight import FlightResults
+from groundstation.systems.inertial.alignment_plots import ground_marks
 from groundstation.systems.inertial.answer import InertialResult
 from groundstation.systems.inertial.arrays import (
     InertialDifferences,
@@ -143,6 +144,7 @@ def radial(results: FlightResults) -> Plot | None:
     states = results.rows_of(InertialStates)
     corrected = "corrected: INS − estimated or forecast error"
     marks: list[AnyMark] = [] if states is None else [outages(states)]
+    marks += ground_marks(results, named=True)
     marks.append(Curve(x=data.time_s, y=positive(data.ins_error_m), role="ins", name="INS"))
     marks.append(Curve(x=data.time_s, y=positive(data.corrected_error_m), role="answer", name=corrected))
     panel = Panel(marks, time_axis(*span(data.time_s)), Axis("radial error against GNSS, m", "log"))

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
+from groundstation.systems.inertial.alignment_analysis import GROUND
 from groundstation.systems.inertial.analysis import CAUSES, FORECAST, INERTIAL, UNITS
 from groundstation.systems.system import FleetTab, InFleet, Study, System, Tab
 
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 
 def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.chapters.chapter import Chapter
+    from groundstation.systems.inertial.alignment_answer import GroundResult
+    from groundstation.systems.inertial.alignment_chapter import ground
     from groundstation.systems.inertial.answer import InertialResult
     from groundstation.systems.inertial.cause_answer import CausesResult
     from groundstation.systems.inertial.cause_chapter import causes
@@ -28,6 +31,7 @@ def _chapters() -> "tuple[Chapter, ...]":
     return (
         Chapter((InertialResult,), inertial, sources=SOURCES),
         Chapter((CausesResult,), causes),
+        Chapter((GroundResult,), ground),
         Chapter((UnitsResult,), units),
         Chapter((ForecastResult,), forecast, sources=SOURCES),
     )
@@ -127,9 +131,21 @@ def _outcome_units() -> type:
     return UnitsOutcome
 
 
+def _study_ground() -> "Callable[..., StudyResult]":
+    from groundstation.systems.inertial.study.ground import study_ground
+
+    return study_ground
+
+
+def _outcome_ground() -> type:
+    from groundstation.systems.inertial.study.ground_runs import GroundOutcome
+
+    return GroundOutcome
+
+
 SYSTEM = System(
     name="inertial",
-    analyses=(INERTIAL, CAUSES, FORECAST, UNITS),
+    analyses=(INERTIAL, CAUSES, FORECAST, UNITS, GROUND),
     studies=(
         Study(
             "forecast",
@@ -146,6 +162,12 @@ SYSTEM = System(
             "several INS of one flight: false alarms, faults found and named, coverage of the table's intervals",
             _study_units,
             _outcome_units,
+        ),
+        Study(
+            "ground",
+            "alignment and shutdown of an INS: coverage of tilt, azimuth, drift while standing and residual speed",
+            _study_ground,
+            _outcome_ground,
         ),
     ),
     chapters=_chapters,
