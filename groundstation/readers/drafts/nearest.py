@@ -15,6 +15,7 @@ from groundstation.readers.source import Source
 FEWEST_SHARED, LEAST_SHARE = 4, 0.5  # columns, one fewer of others' profiles, and their share of those of the profile
 MOST_NAMED = 8
 _FEWEST_ROWS = 3  # and columns, of a table without names
+_SENTENCE = re.compile(r"(?:^|\s)[$!][A-Z]{2}[A-Z0-9]{3}$")  # NMEA, whose damage its own reader tells
 _FEWEST_OF_NUMBERS = 2  # of its columns: lines of a text count themselves
 _MOST_SEARCHED = 500  # names among which a similar one is looked for
 
@@ -63,11 +64,13 @@ def advice_on(source: Source, profiles: Iterable[Profile], page: str) -> Advice 
 def _without_names(sample: TableSample, draft: str) -> Advice | None:
     """Return advice on a table without a row of names.
 
-    None where its rows are few, or lines of a text.
+    None where its rows are few, lines of a text, or sentences of a receiver.
     """
     rows, count = sum(map(len, sample.blocks)), len(sample.names)
     of_numbers = sum(map(sample.is_of_numbers, range(count)))
     if rows < _FEWEST_ROWS or count < _FEWEST_ROWS or of_numbers < _FEWEST_OF_NUMBERS:
+        return None
+    if any(_SENTENCE.search(cell) for row in sample.blocks[0] for cell in row):
         return None
     parted = "blanks" if sample.is_spaced else f"{sample.delimiter!r}"
     found = f"a table without a row of names ({count} columns parted by {parted}, the first row: "
