@@ -21,6 +21,7 @@ from groundstation.readers.sections import HeaderPlace, lines_below
 from groundstation.readers.source import Source
 from groundstation.readers.told import ColumnFacts, bare, told
 
+_MOST_VOTES = 500  # rows that tell whether a delimiter ends them
 _MOST_ABOVE = 20  # lines above a header in the middle of a file that belong to it
 _TIMES: Mapping[str, re.Pattern[str]] = {
     "local": re.compile(r"(.*[T\s])?(\d{1,2}:\d\d(:\d\d([.,]\d*)?)?(\s*[AaPp]\.?[Mm]\.?)?|\d{6}([.,]\d*)?)"),
@@ -116,7 +117,7 @@ class Fit:
 
     @cached_property
     def _cell_count(self) -> int:
-        return len(self.names) + trailing_cells(self.first_rows, self.delimiter, len(self.names))
+        return len(self.names) + trailing_cells(self.first_rows[:_MOST_VOTES], self.delimiter, len(self.names))
 
     @cached_property
     def position(self) -> Mapping[str, int]:

@@ -1,7 +1,8 @@
 """Tables with blanks between columns, or columns of fixed width, seen with tabs.
 
 A blank before each cell is shown as a tab, so every byte stays at its place: lines, their numbers and the bytes where
-they begin are those of the file. Where cells of fixed width touch, the lines are written anew into a temporary file.
+they begin are those of the file. Lines of fixed width are written anew: into memory, or into
+a temporary file where they are many.
 """
 
 import io
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.compile import in_place
 from groundstation.base.records import BoolArray
-from groundstation.readers.compressed import FileWindow, unnamed_file
+from groundstation.readers.held import HeldBytes, HeldView
 from groundstation.readers.positioned import Positioned
 from groundstation.readers.row_shapes import COMPILED_BYTES, RowShape, shape_of
 from groundstation.readers.source import HEAD_BYTES, MadeSource, Source
@@ -258,15 +259,15 @@ class FixedSource(MadeSource):
     @cached_property
     def size(self) -> int:
         """Size in bytes, tabs counted."""
-        return self._written[1]
+        return self._written.size
 
     def open(self) -> BinaryIO:
         """Open for reading bytes with tabs."""
-        return io.BufferedReader(FileWindow(*self._written))
+        return io.BufferedReader(HeldView(self._written))
 
     @cached_property
-    def _written(self) -> tuple[BinaryIO, int]:
-        file, size = unnamed_file(), 0
+    def _written(self) -> HeldBytes:
+        held = HeldBytes()
         with self.whole.open() as stream:
             rest = b""
             while data := stream.read(_WRITTEN_BYTES):
@@ -274,11 +275,10 @@ class FixedSource(MadeSource):
                 if not end and len(rest) < _WRITTEN_BYTES:
                     rest += data
                     continue
-                size += sum(map(file.write, self._parted(rest + data[:end] if end else rest)))
+                held.extend(self._parted(rest + data[:end] if end else rest))
                 rest = data[end:] if end else data
-        size += sum(map(file.write, self._parted(rest)))
-        file.flush()
-        return file, size
+        held.extend(self._parted(rest))
+        return held
 
     def rows(self, lines: bytes) -> tuple[bytes, RowShape | None]:
         """Return the lines, and their shape."""

@@ -1,8 +1,8 @@
 """Rows of several vehicles in one table, brought together vehicle by vehicle.
 
-The rows of a block are put in the order of their vehicles into a temporary file; the table is then read as if the rows
-of each vehicle stood together, the one that comes last in the file first: so its times lie before those above it, and
-each is a log of its own.
+The rows of a block are put in the order of their vehicles into memory, or a temporary file. The table is then read as
+if the rows of each vehicle stood together, the one that comes last in the file first: so its times lie before those
+above it, and each is a log of its own.
 """
 
 import io
@@ -16,8 +16,8 @@ import pyarrow as pa
 from groundstation.base import arrow_values as arrow
 from groundstation.base.records import Int64Array, Remark
 from groundstation.readers.cells import trimmed
-from groundstation.readers.compressed import unnamed_file
 from groundstation.readers.dialect import Dialect
+from groundstation.readers.held import HeldBytes
 from groundstation.readers.losses import Losses
 from groundstation.readers.positioned import Positioned
 from groundstation.readers.row_shapes import RowShape, cell_places, shape_of
@@ -42,7 +42,7 @@ class _Chunk:
 class GroupedSource(MadeSource):
     """Rows of a table, vehicle by vehicle."""
 
-    file: BinaryIO
+    file: HeldBytes
     chunks: tuple[_Chunk, ...]
     delimiter: str
 
@@ -63,7 +63,7 @@ class GroupedSource(MadeSource):
 class _Chunks(Positioned):
     """Pieces of a file in another order."""
 
-    def __init__(self, file: BinaryIO, chunks: Sequence[_Chunk]) -> None:
+    def __init__(self, file: HeldBytes, chunks: Sequence[_Chunk]) -> None:
         self._file, self._chunks = file, chunks
         self._ends = np.cumsum([one.size for one in chunks], dtype=np.int64)
 
@@ -77,11 +77,9 @@ class _Chunks(Positioned):
             return 0
         chunk = self._chunks[number]
         left = int(self._ends[number]) - self._at
-        self._file.seek(chunk.at + chunk.size - left)
-        data = self._file.read(min(left, len(view)))
-        view[: len(data)] = data
-        self._at += len(data)
-        return len(data)
+        count = self._file.readinto(chunk.at + chunk.size - left, view[: min(left, len(view))])
+        self._at += count
+        return count
 
 
 @dataclass(frozen=True)
@@ -117,7 +115,7 @@ def by_vehicle(
     Vehicles or None
         None where no row tells its vehicle.
     """
-    file, chunks, at = unnamed_file(), dict[str, list[_Chunk]](), 0
+    file, chunks, at = HeldBytes(), dict[str, list[_Chunk]](), 0
     for block in RowScanner(source, section.dialect, losses, is_compiled=True):
         for key, rows, lines in _parted(block, section.dialect, column):
             if not key:
@@ -125,7 +123,6 @@ def by_vehicle(
             elif not only or key in only:
                 chunks.setdefault(key, []).append(_Chunk(at, len(rows), len(lines)))
                 at += file.write(rows)
-    file.flush()
     counts = {key: sum(one.rows for one in several) for key, several in chunks.items()}
     most = set(sorted(counts, key=lambda key: -counts[key])[:MOST])
     if not most:

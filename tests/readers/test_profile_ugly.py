@@ -270,3 +270,10 @@ def test_a_name_that_occurs_twice_is_told(write: Write) -> None:
     at = write("a.csv", table("time_s,lat,lon,lat", *rows("{t},{n:.5f},{e:.5f},9")))
     read = Read(at, drafted(at)[0])
     assert read.values("gnss", "latitude_deg")[0] == 55.0 and read.remarks["duplicate_column"].text.startswith("lat:")
+
+
+def test_a_delay_in_milliseconds_is_no_counter(write: Write) -> None:
+    cells = (f"2021-03-12T12:00:{t // 4:02d}Z,{40 + 7 * t % 11 + t / 100},55.{t},37.{t}" for t in range(100))
+    at = write("a.csv", table("UTC,Latency (ms),Lat,Lon", *cells))
+    draft = new_profile(at)
+    assert draft.time_names == ("UTC",) and "rows repeat" in draft.time.doubt

@@ -22,6 +22,7 @@ from groundstation.readers.drafts.time_guess import (
 from groundstation.readers.drafts.words import TIME_WORDS, in_brackets, words_of
 
 _SINCE_1970 = {"s": (8e8, 4e9), "ms": (8e11, 4e12), "us": (8e14, 4e15), "ns": (8e17, 4e18)}
+_COUNTED = 0.75  # share of the steps that do not go back of a column that has a unit of time, and another name
 _WEEK_S = 604_800.0
 
 
@@ -67,7 +68,8 @@ def of_numbers(sample: TableSample) -> Iterator[TimeGuess]:
         known = values[np.isfinite(values)]
         if len(known) < (1 if is_named else 2) or len(known) < 0.5 * len(values) or not sample.is_of_numbers(at):
             continue
-        if not moves(values, NAMED if is_named else RISING):
+        share = (NAMED if meaning or _falls_are_wraps(known) else _COUNTED) if is_named else RISING
+        if not moves(values, share):
             continue
         middle, step = float(np.median(known)), _step(sample, at)
         since = next((unit for unit, (low, high) in _SINCE_1970.items() if low < middle < high), "")
@@ -89,6 +91,18 @@ def of_numbers(sample: TableSample) -> Iterator[TimeGuess]:
         lines = (f'kind = "{"unix" if since else "seconds"}"', f"column = {quoted(name)}", f'unit = "{unit}"')
         rank = rank_of(sample, at) + (bool(since) if is_named else -2)  # seconds since 1970 need no zone
         yield TimeGuess((at,), lines, why, values * SECONDS[unit], bool(since), doubt, rank)
+
+
+def _falls_are_wraps(known: FloatArray) -> bool:
+    """Tell whether numbers fall by most of their range alone, as a counter does that wraps.
+
+    Examples
+    --------
+    >>> _falls_are_wraps(np.array([8.0, 9.0, 0.0, 1.0])), _falls_are_wraps(np.array([8.0, 9.0, 7.0, 1.0]))
+    (True, False)
+    """
+    steps = np.diff(known)
+    return bool(np.all(steps[steps < 0.0] < -0.5 * np.ptp(known)))
 
 
 def of_fractions(sample: TableSample, utc: TimeGuess) -> Iterator[TimeGuess]:
