@@ -6,6 +6,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.base.quantiles import NORMAL_95
+from groundstation.base.records import Int64Array
 from groundstation.methods.ins_noise import RADPS_PER_DPH
 from groundstation.systems.inertial.cause_answer import (
     CAUSES,
@@ -176,7 +177,7 @@ def _shares(fit: CauseFit) -> tuple[CauseShare, ...]:
 
 
 def _sigma(row: FloatArray, covariance: FloatArray) -> float:
-    return float(np.sqrt(max(row @ covariance @ row, 0.0)))
+    return float(np.sqrt(max(float(row @ covariance @ row), 0.0)))
 
 
 class CauseRow(NamedTuple):
@@ -270,7 +271,7 @@ def error_windows(run: ChannelsRun, position_m: FloatArray, start_s: float | Non
         When navigation began.
     """
     time_s, resets = run.epochs.time_s, np.cumsum(run.epochs.is_reset)
-    known = np.flatnonzero(np.isfinite(position_m).all(axis=1))
+    known = np.flatnonzero(np.isfinite(position_m).all(axis=1)).astype(np.int64)
     if not len(known):
         return ()
     span_s = float(time_s[known[-1]] - time_s[known[0]])
@@ -289,18 +290,18 @@ def error_windows(run: ChannelsRun, position_m: FloatArray, start_s: float | Non
             at = int(_nearest(time_s, known, np.array([start_s + length]))[0])
             is_clean = at >= 0 and resets[at] == 0
             since = float(np.hypot(*position_m[at])) if is_clean else None
-        quantiles = [float(one) for one in np.quantile(grown, [0.5, 0.95])] if len(grown) else [None, None]
-        found.append(ErrorWindow(hours, since, *quantiles, len(grown), int(span_s // length) if len(grown) else 0))
+        median, p95 = np.quantile(grown, [0.5, 0.95]).tolist() if len(grown) else (None, None)
+        found.append(ErrorWindow(hours, since, median, p95, len(grown), int(span_s // length) if len(grown) else 0))
     return tuple(found)
 
 
-def _nearest(time_s: FloatArray, known: FloatArray, at_s: FloatArray) -> FloatArray:
+def _nearest(time_s: FloatArray, known: Int64Array, at_s: FloatArray) -> Int64Array:
     """Return the known rows nearest to some times, -1 where none is within :data:`NEAR_S`."""
     times = time_s[known]
     after = np.clip(np.searchsorted(times, at_s), 0, len(times) - 1)
     before = np.maximum(after - 1, 0)
     place = np.where(np.abs(times[before] - at_s) < np.abs(times[after] - at_s), before, after)
-    return np.where(np.abs(times[place] - at_s) <= NEAR_S, known[place], -1)
+    return np.asarray(np.where(np.abs(times[place] - at_s) <= NEAR_S, known[place], -1), dtype=np.int64)
 
 
 def _over_time(fit: CauseFit) -> CausesOverTime:
