@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 from groundstation.results.answer import Answer
+from groundstation.results.figures import FigureData
 from groundstation.systems.inertial.units_answer import Measured
 
 AlignmentKind = Literal["gyrocompass", "stored_heading", "in_motion", "gnss_aided", "unknown"]
@@ -196,3 +197,4 @@ class GroundResult(Answer):
     shutdown: InsShutdown
     realignments: tuple[InsRealignment, ...] = ()
     mode_flicker: int = 0
+    figures: tuple[FigureData, ...] = ()

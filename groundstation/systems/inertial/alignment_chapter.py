@@ -9,7 +9,6 @@ from groundstation.systems.inertial.alignment_answer import (
     GroundResult,
     InsAlignment,
     InsRealignment,
-    InsShutdown,
     StandingDrift,
 )
 from groundstation.systems.inertial.units_answer import Measured
@@ -53,10 +52,13 @@ def _headline(answer: GroundResult) -> str:
     return f"{kind}{length}{end}"
 
 
-def _claim(answer: GroundResult) -> Claim:
+def _claim(answer: GroundResult) -> Claim | None:
+    """Return a tile where there is something to warn of."""
     moved = answer.alignment.is_moved and answer.alignment.kind != "in_motion"
     above = answer.standing is not None and answer.standing.is_above
-    mark = Mark("warn", "Moved") if moved else Mark("warn", "Drifts") if above else Mark("unknown", "Shown")
+    if not moved and not above:
+        return None
+    mark = Mark("warn", "Moved while aligning" if moved else "Drifts while standing")
     return Claim(Rank.OTHER, mark, _headline(answer), "", "", ())
 
 
@@ -103,7 +105,7 @@ def _table(answer: GroundResult) -> Grid:
         *_alignment(answer.alignment),
         *_start(answer.at_start),
         _standing(answer.standing, answer.standing_reason),
-        *_shutdown(answer.shutdown, answer.kind),
+        *_shutdown(answer),
     ]
     caption = (
         "± is half of the 95 % interval. Tilt: positive where the velocity error falls. Lengths of two axes (drift, "
@@ -153,13 +155,15 @@ def _standing(standing: StandingDrift | None, why_not: str) -> Line:
     return (title, Mark("warn", text) if standing.is_above else text, how)
 
 
-def _shutdown(end: InsShutdown, kind: str) -> list[Line]:
+def _shutdown(answer: GroundResult) -> list[Line]:
+    end = answer.shutdown
     parked = "" if end.start_s is None else f"parked from {clock(end.start_s)}"
     how = "; ".join(filter(None, (parked, end.reason)))
     lines: list[Line] = [("Ground speed at shutdown", _measured(end.residual_speed_mps, 3, "m/s"), how)]
     if end.position_error_m is not None:
-        what = "Distance from GNSS at the end" if kind == "gnss_aided" else "Position error at the end"
-        hours = "" if end.hours is None else f", {number(end.hours, 2, 'h')} after the start"
+        what = "Distance from GNSS at the end" if answer.kind == "gnss_aided" else "Position error at the end"
+        since = "after the last of the lines below" if answer.realignments else "after the start"
+        hours = "" if end.hours is None else f", {number(end.hours, 2, 'h')} {since}"
         at = f"at {clock(end.position_at_s)}{hours}"
         lines.append((what, _measured(end.position_error_m, 1, "m"), at))
     if end.terminal_rate_nmiph is not None:

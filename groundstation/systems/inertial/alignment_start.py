@@ -35,6 +35,7 @@ LATE_S = 60.0  # the first difference may come so long after the start
 LONGEST_BLIND_S = 600.0  # without GNSS: what lies beyond tells little of the start
 TILT = VELOCITY + 1
 ARCSEC_PER_RAD = 180.0 / np.pi * 3600.0
+MOST_REJECTED = 0.02  # of the measurements
 LEAST_SHARE = 0.7  # of its sigma at the start: what stays above was not seen
 
 
@@ -82,7 +83,7 @@ def _tilts(
         )
     found = _smoothed_start(taken(compared, after), noise, settings)
     if found is None:
-        return None, None, "the filter rejected GNSS for so long that it was opened again"
+        return None, None, "GNSS was rejected: the class does not fit this INS or this receiver"
     value, variance, before = found
     tilt = CHANNELS[:, TILT]
     sigma, known = np.sqrt(variance[tilt]), np.sqrt(before[tilt])
@@ -136,7 +137,7 @@ def _smoothed_start(
 ) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """Return states at the first epoch, smoothed, their variances, and those before any data.
 
-    None where the filter was opened on the way: there is then no one run to go back over.
+    None where the filter was opened on the way, or rejected much: the class does not fit.
     """
     epochs = only_used(compared.epochs, settings)
     n = len(epochs)
@@ -160,7 +161,7 @@ def _smoothed_start(
         gate=gate,
         kept=kalman.KeptArrays(),
     )
-    if run.reopened:
+    if run.reopened or run.rejected > MOST_REJECTED * max(int(np.isfinite(z).sum()), 1):
         return None
     smoothed = smooth(run)
     return smoothed.x[0, :, 0], smoothed.variance[0], np.asarray(np.diag(covariance))

@@ -9,15 +9,24 @@ import pytest
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.base.records import Column
+from groundstation.chapters.markdown import markdown
+from groundstation.methods.ins_noise import load_class
+from groundstation.plots.marks import Limit, Spans
 from groundstation.simulation.ins_parked import ParkedFlight, ParkedSettings, simulate_parked
 from groundstation.systems.inertial.alignment_analysis import GROUND
-from groundstation.systems.inertial.alignment_answer import GroundResult
+from groundstation.systems.inertial.alignment_answer import GroundResult, InsRealignment
+from groundstation.systems.inertial.alignment_chapter import ground
+from groundstation.systems.inertial.alignment_ends import drift_limit_mps2
 from groundstation.systems.inertial.alignment_findings import assess_ground, told_by_ground
+from groundstation.systems.inertial.alignment_plots import ground_marks
 from groundstation.systems.inertial.analysis import INERTIAL
 from groundstation.systems.inertial.settings import InertialSettings
+from groundstation.systems.inertial.study.ground import coverage_of, told_of
+from groundstation.systems.inertial.study.ground_runs import CASES, judge_parked
 from groundstation.systems.known import AircraftData, Known
 from groundstation.tables.phases import Phases
 from groundstation.tables.table import Flight
+from tests.report_example import example
 from tests.systems.inertial.flights import changed, without_rows
 
 SETTINGS = InertialSettings()
@@ -255,3 +264,44 @@ def test_check_says_what_of_the_ground_a_log_gives() -> None:
     alone = replace(made.log, tables={"ins": made.log["ins"]})
     assert "without GNSS" in told_by_ground(alone)[1]
     assert told_by_ground(replace(made.log, tables={"gnss": made.log["gnss"]})) == ()
+
+
+def test_the_page_tells_the_table_and_warns_where_there_is_something_to_warn_of() -> None:
+    calm, _ = assess(parked().log)
+    section = ground(example(calm))
+    assert section is not None and section.claim is None
+    text = markdown(section)
+    for told in ("Gyrocompass", "at least 10:00", "Tilt at the start", "Terminal error rate", "parked from"):
+        assert told in text, told
+    moved, _ = assess(parked(tug_m=40.0).log)
+    section = ground(example(moved))
+    assert section is not None and section.claim is not None and "Moved" in section.claim.mark.text
+    assert "The aircraft moved by up to" in markdown(section)
+
+
+def test_plots_of_errors_show_alignment_and_stands() -> None:
+    found, _ = assess(parked().log)
+    again = replace(found, realignments=(InsRealignment(2000.0, 2100.0, True, "moving"),))
+    marks = ground_marks(example(again), named=True)
+    assert [mark.name for mark in marks if isinstance(mark, Spans)] == ["alignment", "standing"]
+    assert [mark.value for mark in marks if isinstance(mark, Limit)] == [2100.0]
+    assert ground_marks(example(), named=True) == []
+
+
+def test_a_class_of_its_own_has_a_limit_by_its_noise() -> None:
+    own = replace(load_class("navigation"), name="own")
+    limits = [drift_limit_mps2(one, 0.0, 300.0) for one in (load_class("navigation"), own)]
+    assert 0.0 < limits[0] < limits[1]
+    assert drift_limit_mps2(own, 600.0, 300.0) > limits[1]
+
+
+def test_the_study_holds_every_interval_against_the_truth() -> None:
+    outcome = judge_parked("navigation, manoeuvring", replace(CASES["navigation, manoeuvring"], flight_s=2000.0), 5, 0)
+    assert outcome.why_not == "" and outcome.kind == "gyrocompass" and outcome.is_moved is False
+    assert {cell.quantity.split(",")[0] for cell in outcome.cells} >= {
+        *("tilt", "standing drift", "speed at shutdown", "position at the end", "terminal rate")
+    }
+    off = replace(outcome, cells=tuple(replace(cell, error=2.0 * cell.half95) for cell in outcome.cells))
+    table = coverage_of([outcome, off])
+    assert set(table["values"].tolist()) <= {2, 4} and max(table["inside95"].tolist()) <= 0.5
+    assert told_of([outcome])["kind"].tolist() == [1.0]
