@@ -142,4 +142,4 @@ def test_sigmas_are_raised_until_the_rms_of_outages_is_theirs() -> None:
     assert factors.position >= np.sqrt(np.mean(error**2)) > 1.0
     (row,) = outage_rows(outages, factors.position, factors.height)
     assert row.rms_over_sigma <= 1.0
-    assert "RMS error of 60 s 1.98 times its sigma" in rows[0].reason
+    assert "in those of 60 s the RMS error is 1.98 times its sigma" in rows[0].reason
