@@ -180,7 +180,7 @@ def _answered(
             f"{_why_heading(raised, settings)}",
         )
     gates = _gates(innovations, sigma_deg, factors, settings)
-    state, reasons = _state(gathered, mounting, main, hypotheses, gates, outages, factors, settings)
+    state, reasons = _state(gathered, mounting, main, hypotheses, gates, outages, raised, settings)
     separation, separation_figure = figures.separation_of(forward, smoothed)
     compared = _onboard(smoothed, flight)
     other = _other_heading(smoothed, hypotheses) if state == "ambiguous" else None
@@ -304,12 +304,14 @@ def _state(
     hypotheses: tuple[HeadingHypothesis, ...],
     gates: tuple[Gate, ...],
     outages: Outages,
-    factors: judge.Factors,
+    raised: tuple[RaisedSigma, ...],
     settings: TrajectorySettings,
 ) -> tuple[TrajectoryState, tuple[str, ...]]:
     """Return the state, and why it is not accepted."""
+    why = {f"raised_{row.name}": f": {row.reason}" for row in raised if row.reason}
     reasons = [
         f"{gate.title} {gate.value:.2g}{' ' + gate.unit if gate.unit else ''}, limit {_limit(gate)}"
+        f"{why.get(gate.name, '')}"
         for gate in gates
         if gate.state == "failed" and gate.value is not None
     ]
