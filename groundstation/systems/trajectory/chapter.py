@@ -251,7 +251,7 @@ def _outages(answer: BestTrajectory) -> Grid | None:
     heads = (
         *(Head("Without GNSS, s", True), Head("Outages", True), Head("Smoothed, largest inside, RMS", True)),
         *(Head("Forward filter at the end, RMS", True), Head("Inside 95 %", True), Head("RMS error / σ", True)),
-        *(Head("Height, largest inside, RMS", True), Head("Inside 95 %", True), Head("Replayed, s", True)),
+        *(Head("Height, largest inside, RMS", True), Head("Inside 95 %", True)),
     )
     rows = [
         (
@@ -263,7 +263,6 @@ def _outages(answer: BestTrajectory) -> Grid | None:
             number(one.rms_over_sigma, 2),
             _with(one.vertical_rms_m, "m"),
             ABSENT if one.vertical_inside95_share is None else percent(one.vertical_inside95_share),
-            number(one.seconds, 0),
         )
         for one in answer.outages
     ]
@@ -275,13 +274,15 @@ def _outages(answer: BestTrajectory) -> Grid | None:
 
 def _checks(answer: BestTrajectory) -> Grid | None:
     rows: list[tuple[Cell, ...]] = [*map(_innovation, answer.innovations)]
-    if answer.own_track is not None:
-        own = answer.own_track
-        scatter = "" if own.scatter_100_s_deg is None else f"; medians of 100 s {number(own.scatter_100_s_deg, 2, '°')}"
-        found = f"MAD {number(own.mad_deg, 2, '°')}{scatter}"
-        rows.append(("Heading minus own track, straights", found, ABSENT, number(own.samples, 0), ABSENT))
     heads = (Head("Check"), Head("Found", True), Head("Expected", True), Head("n", True), Head("State"))
     caption = "Innovations: mean square over expected."
+    if answer.own_track is not None:
+        own = answer.own_track
+        scatter = (
+            "" if own.scatter_100_s_deg is None else f", of medians of 100 s {number(own.scatter_100_s_deg, 2, '°')}"
+        )
+        mad = number(own.mad_deg, 2, "°")
+        caption += f" Heading minus own track on straights scatters by {mad} (median absolute){scatter}."
     return Grid("Checks on the log itself", heads, rows, caption) if rows else None
 
 

@@ -117,7 +117,9 @@ def _why_position(outages: Outages) -> str:
     inside = f"{np.mean(outages.ratio <= 1.0):.0%} of {len(outages)} replayed outages inside 95 %"
     many = [one for one in LENGTHS_S if outages.of_length(one).sum() >= 2 * FEW]
     share, length_s = max(((_rms_over_sigma(outages, outages.of_length(one)), one) for one in many), default=(0.0, 0.0))
-    return f"{inside}; RMS error of {length_s:g} s {share:.2f} times its sigma" if share > 1.0 else inside
+    return (
+        f"{inside}; in those of {length_s:g} s the RMS error is {share:.2f} times its sigma" if share > 1.0 else inside
+    )
 
 
 def with_factors(track: TrackOfStates, factors: Factors, constant_m: FloatArray) -> TrackOfStates:

@@ -120,7 +120,7 @@ def errors_of(track: TrackOfStates, output: FilterOutput, delay_s: float) -> Err
 def _attitude(
     output: FilterOutput, ours: TrackOfStates, length_s: float
 ) -> tuple[FloatArray, tuple[Constant, Constant, Constant], FloatArray]:
-    """Return errors of roll, pitch and heading, what was constant in them, and the shares that are judged.
+    """Return errors of roll, pitch and heading, what was constant in them, and judged shares.
 
     Where ours is not sure itself no error is told.
     """

@@ -68,7 +68,7 @@ def _errors(
             ZERO,
             Curve(x=line_s, y=line, role="ins", name="on-board − smoothed"),
         ]
-        low, high = symmetric(np.append(usual(values), usual(half)), 1e-3)
+        low, high = symmetric(np.append(usual(values), usual(half[np.isfinite(error)])), 1e-3)
         panel = Panel(marks, ends, Axis(axis, low=low, high=high), legend="" if rows else "above")
         rows.append(Row((panel,), height_mm, shares_x=axis != known[-1][0]))
     return Plot(

@@ -201,7 +201,7 @@ def outages(results: FlightResults) -> Plot | None:
     x = Axis("length of the outage, s", "log", low=0.7 * lengths[0], high=1.4 * lengths[-1], ticks=tuple(lengths))
     return Plot(
         "trajectory.outages",
-        "Outages of GNSS, replayed",
+        "Errors inside replayed outages",
         f"{len(data)} outages: GNSS was withheld, and the horizontal error is that against the solution with it.",
         "Horizontal errors of replayed outages by their length.",
         one_panel(Panel(marks, x, Axis("horizontal error, m", "log")), 58.0),

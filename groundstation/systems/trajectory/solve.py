@@ -153,8 +153,8 @@ def _answered(
     vehicle: str,
 ) -> tuple[BestTrajectory, tuple[Finding, ...], Solved]:
     estimates = tuple(one.estimate for one in segments)
-    longest = max(segments, key=lambda one: len(one.estimate.result.plan.epoch_s))
-    main = longest.estimate
+    place = max(range(len(segments)), key=lambda one: len(estimates[one].result.plan.epoch_s))
+    main = estimates[place]
     innovations = checks.innovations_of(main)
     _fits(innovations, main, settings)
     outages = _joined([replay(one) for one in estimates])
@@ -180,7 +180,7 @@ def _answered(
             f"{_why_heading(raised, settings)}",
         )
     gates = _gates(innovations, sigma_deg, factors, settings)
-    state, reasons = _state(gathered, mounting, main, hypotheses, gates, outages, factors, settings)
+    state, reasons = _state(gathered, mounting, main, hypotheses, gates, outages, raised, settings)
     separation, separation_figure = figures.separation_of(forward, smoothed)
     compared = _onboard(smoothed, flight)
     other = _other_heading(smoothed, hypotheses) if state == "ambiguous" else None
@@ -201,12 +201,12 @@ def _answered(
         noise=tell.noise_rows(main),
         parameters=tell.parameter_rows(main),
         innovations=innovations,
-        held_out=fix_residuals.held_out_rows(residuals[estimates.index(main)]),
+        held_out=fix_residuals.held_out_rows(residuals[place]),
         own_track=own,
         outages=judge.outage_rows(outages, factors.position, factors.height),
         outage_truth="RTK" if gathered.gnss_facts.precise_share > 0.9 else "undisturbed solution",
         hypotheses=hypotheses,
-        aids=longest.aids,
+        aids=segments[place].aids,
         onboard=compared[0].errors if compared else None,
         other_filters=tuple(one.errors for one in compared[1:]),
         separation=separation,
@@ -248,7 +248,7 @@ def _fits(innovations: tuple[InnovationRow, ...], main: Estimate, settings: Traj
 
 
 def _why_heading(raised: tuple[RaisedSigma, ...], settings: TrajectorySettings) -> str:
-    """Return why the heading is not known: its sigma had to be raised, or the motion does not show it."""
+    """Return why the heading is not known: sigma raised, or nothing in the motion shows it."""
     row = next(one for one in raised if one.name == "heading")
     return row.reason if row.factor > settings.raised_doubt else "the motion does not show it"
 
@@ -304,12 +304,14 @@ def _state(
     hypotheses: tuple[HeadingHypothesis, ...],
     gates: tuple[Gate, ...],
     outages: Outages,
-    factors: judge.Factors,
+    raised: tuple[RaisedSigma, ...],
     settings: TrajectorySettings,
 ) -> tuple[TrajectoryState, tuple[str, ...]]:
     """Return the state, and why it is not accepted."""
+    why = {f"raised_{row.name}": f": {row.reason}" for row in raised if row.reason}
     reasons = [
         f"{gate.title} {gate.value:.2g}{' ' + gate.unit if gate.unit else ''}, limit {_limit(gate)}"
+        f"{why.get(gate.name, '')}"
         for gate in gates
         if gate.state == "failed" and gate.value is not None
     ]
@@ -319,6 +321,12 @@ def _state(
             f"point samples of {facts.rate_hz:.0f} Hz: vibration and motion between them are not in the log, limit "
             f"{settings.sample_rate_doubt_hz:g} Hz"
         )
+    reasons += [
+        f"{row.name} of the unit is fitted at its bound, {row.fitted:.3g} {row.unit}: the log shakes more than the "
+        "model allows"
+        for row in tell.noise_rows(main)
+        if row.name in tell.DENSITIES and row.is_at_bound and row.fitted > row.prior
+    ]
     share = checks.used_share(main)
     if share < settings.used_share_min:
         reasons.append(f"{share:.0%} of GNSS agrees with the unit, limit {settings.used_share_min:.0%}")

@@ -26,6 +26,7 @@ from groundstation.systems.trajectory.states import (
     WHL,
 )
 
+DENSITIES = ("gyro noise", "accelerometer noise")
 OBSERVABLE = 0.6  # of the sigma at the start: what keeps more of it was not seen
 MG_PER = 1e-3 * MPS2_PER_G
 NOISES = (

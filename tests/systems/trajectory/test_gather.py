@@ -368,6 +368,27 @@ def test_a_stuck_axis_is_left_out_or_refused() -> None:
     assert "gyro x of imu keeps one value" in refused(samples(time_s, rate_x_dps=np.full(len(time_s), 0.25)), fixes())
 
 
+def test_an_axis_stuck_at_rest_is_told_by_the_other_two() -> None:
+    """All are quiet. Of a coarse unit, whose noise is below its steps, no axis is stuck that keeps its value."""
+    time_s = imu_times()
+    quiet = noise(len(time_s))
+    stuck = quiet.copy()
+    stuck[4000:4800, 2] = stuck[4000, 2]
+    rests = (np.arange(len(time_s)) >= 4000) & (np.arange(len(time_s)) < 4800)
+    coarse = (
+        np.round((quiet * np.where(rests, 1.0, 20.0)[:, None] + [0.005, 0.005, 0.0, 0.0, 0.0, 0.0]) * 100.0) / 100.0
+    )
+    assert np.ptp(coarse[rests, 2]) == 0.0 and np.ptp(coarse[rests, 0]) > 0.0
+    names = ("rate_x_dps", "rate_y_dps", "rate_z_dps")
+
+    def unit(rates: FloatArray) -> Table:
+        return samples(time_s, **dict(zip(names, rates[:, :3].T, strict=True)))
+
+    found = gathered(unit(stuck), fixes())
+    assert codes(found)["stuck_axis"] == 800 and "gyro z of imu keeps one value from 0:40" in _text(found, "stuck_axis")
+    assert "stuck_axis" not in codes(gathered(unit(coarse), fixes()))
+
+
 @pytest.mark.parametrize("axis", range(6))
 def test_a_stuck_axis_of_increments_over_uneven_intervals_is_found(axis: int) -> None:
     """A quiet unit whose intervals vary: the increments do too, and are in single precision."""

@@ -9,14 +9,18 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.attitude import rotation_n_from_b
 from groundstation.base.records import HEADING_IS_TRACK, Column
 from groundstation.base.units import NS_PER_S
+from groundstation.plots.marks import Curve
+from groundstation.systems.trajectory.arrays import TrajectoryOnboard
 from groundstation.systems.trajectory.onboard import ComparedFilter, compare_onboard
 from groundstation.systems.trajectory.onboard_answer import OnboardError, OnboardErrors
 from groundstation.systems.trajectory.onboard_filters import FIELDS, filters_of
+from groundstation.systems.trajectory.onboard_plots import onboard_attitude
 from groundstation.systems.trajectory.quantity_answer import Quantity
 from groundstation.systems.trajectory.sampling import at_times
 from groundstation.systems.trajectory.solution import TrackOfStates
 from groundstation.tables.table import Flight, Table
 from tests.systems.trajectory.made import onboard, track
+from tests.systems.trajectory.made_answers import accepted, results_of
 
 TRACK = track()
 
@@ -363,3 +367,26 @@ def ardupilot_lane(flight: Flight, lane: int) -> Table:
 def primary(lane: float) -> Table:
     time_ns = np.arange(10, dtype=np.int64) * NS_PER_S
     return Table("raw.XKF4.0", time_ns, {"PI": Column(np.full(10, lane))}, np.arange(10), Column(time_ns))
+
+
+def test_an_attitude_of_ours_that_is_not_sure_judges_nobody() -> None:
+    unsure = np.where(TRACK.time_s < 200.0, 25.0, 0.15)
+    of = replace(TRACK, attitude_sigma_deg=np.column_stack([TRACK.attitude_sigma_deg[:, :2], unsure]))
+    time_s = np.arange(TRACK.time_s[0] + 1.0, TRACK.time_s[-1] - 1.0, 0.1)
+    found = compared(onboard(TRACK, heading_error_deg=np.where(time_s < 199.0, 150.0, 0.0)), of)
+    heading = row(found.errors, "heading")
+    assert heading.rms < 0.1 and heading.sigma_rms < 0.2 and not heading.spans and not heading.changes
+    assert heading.judged_share == pytest.approx(400.0 / 598.0, abs=0.01)
+    assert np.isnan(found.figure.heading_deg[:190]).all() and np.isfinite(found.figure.heading_deg[210:]).all()
+    assert row(found.errors, "roll").judged_share == 1.0
+
+
+def test_the_line_of_a_heading_error_does_not_cross_the_figure() -> None:
+    seam = compared(onboard(TRACK, heading_error_deg=178.0 + 4.0 * np.sin(np.arange(5980) / 300.0))).figure
+    shown = replace(seam, heading_deg=wrap_180(seam.heading_deg + 180.0))
+    made = accepted()
+    figures = tuple(shown if isinstance(one, TrajectoryOnboard) else one for one in made.figures)
+    plot = onboard_attitude(results_of(replace(made, figures=figures)))
+    assert plot is not None
+    line = next(mark for mark in plot.rows[0].panels[0].marks if isinstance(mark, Curve))
+    assert np.nanmax(np.abs(np.diff(line.y))) < 180.0 < np.nanmax(np.abs(np.diff(shown.heading_deg)))

@@ -10,13 +10,20 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.geodesy import north_east_m
 from groundstation.simulation.imu.families import Family
 from groundstation.simulation.imu.flight import ImuFlight, simulate_imu
+from groundstation.simulation.imu.scenario import ImuScenario
 from groundstation.simulation.imu.settings import ImuSettings, MountingSettings, ReceiverSettings, StampSettings
+from groundstation.simulation.imu.tables import log_tables
 from groundstation.simulation.scenario import LogInterval
+from groundstation.systems.known import Known
 from groundstation.systems.trajectory.estimate import Estimate, estimate
 from groundstation.systems.trajectory.inputs import GnssFixes, ImuIncrements
-from groundstation.systems.trajectory.outages import replay
+from groundstation.systems.trajectory.judge import outage_rows, raised
+from groundstation.systems.trajectory.outages import Outages, replay
 from groundstation.systems.trajectory.sampling import at_times
+from groundstation.systems.trajectory.settings import TrajectorySettings
+from groundstation.systems.trajectory.solve import solve
 from groundstation.systems.trajectory.track import smoothed_track
+from groundstation.tables.phases import flight_phases
 
 WITHIN = 4.0  # sigmas: of some hundred independent errors none is larger
 
@@ -112,3 +119,27 @@ def test_later_in_time_all_is_the_same() -> None:
     )
     assert later.result.likelihood == pytest.approx(plain.result.likelihood, abs=1.0)
     assert later.result.constants[:30] == pytest.approx(plain.result.constants[:30], abs=1e-3)
+
+
+def test_a_gap_makes_two_segments_and_the_longer_one_is_told_of() -> None:
+    """The shorter one comes first: what is told of is looked for by its place."""
+    stamps = StampSettings(gaps=(LogInterval(75.0, 78.0),))
+    flight = simulate_imu("uav", 7, settings=ImuSettings(duration_s=190.0, rate_hz=25.0, stamps=stamps))
+    log = log_tables(flight, ImuScenario("uav")).without("truth")
+    answer, _findings, _solved = solve(log, Known(phases=flight_phases(log)), TrajectorySettings())
+    assert [round(one.end_s - one.start_s) for one in answer.segments] == pytest.approx([75, 112], abs=3)
+    assert sum(row.count for row in answer.held_out if row.quantity == "vertical position") > 30
+
+
+def test_sigmas_are_raised_until_the_rms_of_outages_is_theirs() -> None:
+    count, zeros = 12, np.zeros(12)
+    wide = np.zeros((count, 3))
+    error = np.where(np.arange(count) == 0, 6.0, 1.0)  # one outage is far beyond, the other eleven inside
+    outages = Outages(
+        zeros, np.full(count, 60.0), error, np.ones(count), error / 2.0, error, wide, wide, wide, zeros, zeros
+    )
+    factors, rows = raised(outages, None, 0.1, rolls=False)
+    assert factors.position >= np.sqrt(np.mean(error**2)) > 1.0
+    (row,) = outage_rows(outages, factors.position, factors.height)
+    assert row.rms_over_sigma <= 1.0
+    assert "in those of 60 s the RMS error is 1.98 times its sigma" in rows[0].reason
