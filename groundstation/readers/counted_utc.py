@@ -1,11 +1,13 @@
 """Tables with UTC in whole seconds beside a counter that tells the fraction."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from groundstation.base.records import Int64Array, Remark, UtcReadings
 from groundstation.base.units import NS_PER_S
+from groundstation.readers.days import DayCount
 from groundstation.readers.layout import TableLayout, TimeRule
 from groundstation.readers.sections import TableSection
 from groundstation.readers.source import Source
@@ -25,12 +27,15 @@ class CountedUtc:
     readings : UtcReadings, optional
         Of a counter that runs on, at the rows where another second begins.
     remarks : tuple of Remark
+    modulus_ns : int
+        Nanoseconds after which the counter begins anew while UTC goes on; 0: it does not.
     """
 
     kind: str
     utc_of_zero_ns: int | None
     readings: UtcReadings | None = None
     remarks: tuple[Remark, ...] = ()
+    modulus_ns: int = 0
 
 
 def counted_utc(source: Source, section: TableSection) -> CountedUtc:
@@ -51,13 +56,47 @@ def counted_utc(source: Source, section: TableSection) -> CountedUtc:
     if len(steps) and np.median(steps) < 0 and counter_ns.min() >= 0 and counter_ns.max() < 2 * NS_PER_S:
         text = f"{rule.names[0]}: the counter begins anew with each second: it is its fraction"
         return CountedUtc("utc_fraction", 0, remarks=(Remark("utc_fraction", text),))
+    modulus_ns = _modulus_ns(counter_ns, utc_ns, 10**rule.digits * rule.multiple)
+    if modulus_ns:
+        counter_ns = counter_ns + DayCount().days_ns(counter_ns, np.ones(len(counter_ns), dtype=bool), modulus_ns)
     found = told_at_zero(utc_ns, counter_ns)
     rows = changes if len(changes) else np.array([0])
     readings = UtcReadings(lines[rows], utc_ns[rows] - counter_ns[rows])
     text = f"UTC of the counter's zero by {len(rows)} changes of the second, which agree within {found.spread_s:.2f} s"
-    return CountedUtc(
-        "utc_counter", found.ns, readings, (Remark("utc_from_seconds", text), *found.remarks("UTC of the rows"))
-    )
+    told = [Remark("utc_from_seconds", text), *found.remarks("UTC of the rows")]
+    if modulus_ns:
+        wraps = f"{rule.names[0]}: the counter begins anew every {modulus_ns / NS_PER_S:g} s, and is counted on"
+        told.append(Remark("counter_wraps", wraps))
+    return CountedUtc("utc_counter", found.ns, readings, tuple(told), modulus_ns)
+
+
+def _modulus_ns(counter_ns: Int64Array, utc_ns: Int64Array, tick_ns: int) -> int:
+    """Return the nanoseconds after which a counter begins anew while UTC goes on; 0 where it does not.
+
+    A restart is none: UTC then stands still for longer, or the counter falls from no such number.
+
+    Examples
+    --------
+    >>> counter, utc = np.array([65_000, 65_500, 464, 964]) * 10**6, np.array([7, 7, 8, 8]) * NS_PER_S
+    >>> _modulus_ns(counter, utc, 10**6), _modulus_ns(counter, utc * 10, 10**6), _modulus_ns(counter // 2, utc, 10**6)
+    (65536000000, 0, 0)
+    """
+    steps = np.diff(counter_ns)
+    falls = np.flatnonzero(steps < 0)
+    if not len(falls) or not (steps > 0).any():
+        return 0
+    period_ns = int(np.median(steps[steps > 0]))
+    going_on = np.diff(utc_ns)[falls] <= NS_PER_S + 2 * period_ns
+    spans = period_ns - steps[falls]
+    near = [one for one in _moduli(tick_ns) if np.all(np.abs(spans - one) <= max(period_ns, tick_ns))]
+    return near[0] if near and going_on.all() and counter_ns.max() < near[0] else 0
+
+
+def _moduli(tick_ns: int) -> Iterator[int]:
+    """Yield the periods of counters of bits, of decimal digits and of clocks."""
+    ticks = (*(1 << bits for bits in (8, 16, 24, 31, 32)), *(10**digits for digits in range(2, 10)))
+    yield from (tick_ns * count for count in ticks)
+    yield from (NS_PER_S * seconds for seconds in (60, 3600, 43_200, 86_400, 604_800))
 
 
 def _both(source: Source, section: TableSection, utc: TimeRule) -> tuple[Int64Array, Int64Array, Int64Array]:

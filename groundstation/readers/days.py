@@ -105,8 +105,10 @@ class DayCount:
     _last_ns: int = -1
     _days: int = 0
 
-    def days_ns(self, time_ns: Int64Array, present: BoolArray) -> Int64Array:
+    def days_ns(self, time_ns: Int64Array, present: BoolArray, period_ns: int = _DAY_NS) -> Int64Array:
         """Return the time to add to times of the day, nanoseconds, shape (n,).
+
+        A counter that wraps has another period.
 
         Examples
         --------
@@ -119,8 +121,8 @@ class DayCount:
             return np.zeros(len(time_ns), dtype=np.int64)
         before = np.append(known[0] if self._last_ns < 0 else self._last_ns, known[:-1])
         steps = known - before
-        days = self._days + np.cumsum((steps < -_DAY_NS // 2).astype(np.int64) - (steps > _DAY_NS // 2))
+        days = self._days + np.cumsum((steps < -period_ns // 2).astype(np.int64) - (steps > period_ns // 2))
         self._last_ns, self._days = int(known[-1]), int(days[-1])
         found = np.zeros(len(time_ns), dtype=np.int64)
-        found[present] = days * _DAY_NS
+        found[present] = days * period_ns
         return found

@@ -1,4 +1,4 @@
-"""Bytes that are made once and read from any place: in memory while they are few, else in a file."""
+"""Bytes made once and read anywhere: in memory while they are few, else in a file."""
 
 import io
 from collections.abc import Iterable

@@ -105,6 +105,8 @@ class TimeRule:
         Weeks to add, where the week rolled over.
     day_ns : int
         Beginning of the first row's day, for ``time_of_day``.
+    modulus_ns : int
+        Nanoseconds after which a counter beside UTC begins anew; 0: it does not.
     """
 
     kind: TimeKind
@@ -115,6 +117,7 @@ class TimeRule:
     date_formats: tuple[str, ...] = ()
     weeks: int = 0
     day_ns: int = 0
+    modulus_ns: int = 0
 
 
 @dataclass(frozen=True)

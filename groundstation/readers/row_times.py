@@ -30,7 +30,7 @@ def times_of(rule: TimeRule, texts: Sequence[Any], days: DayCount) -> tuple[Tabl
         Of the rows above.
     """
     if rule.kind in ("seconds", "unix", "utc_counter"):
-        return cells.decimal_ns(texts[0], rule.digits, rule.multiple), 0
+        return _of_counter(rule, texts[0], days), 0
     if rule.kind == "nanoseconds":
         return cells.integers_ns(texts[0]), 0
     if rule.kind == "gps_week":
@@ -56,6 +56,15 @@ def utc_of(texts: Sequence[Any], date_formats: tuple[str, ...]) -> tuple[TableCe
     offset = texts[2] if len(texts) > 2 else None
     read = local_ns(texts[0], texts[1], offset, date_formats)
     return read, 0 if offset is None else int(np.count_nonzero(read.column.mask & ~arrow.is_valid(offset)))
+
+
+def _of_counter(rule: TimeRule, text: Any, days: DayCount) -> TableCells:
+    read = cells.decimal_ns(text, rule.digits, rule.multiple)
+    if not rule.modulus_ns:
+        return read
+    mask = read.column.mask
+    time_ns = read.column.values + days.days_ns(read.column.values, mask, rule.modulus_ns)
+    return TableCells(Column(np.where(mask, time_ns, 0), mask), read.unreadable)
 
 
 def _of_week(rule: TimeRule, texts: Sequence[Any], weeks: WeekCount) -> TableCells:

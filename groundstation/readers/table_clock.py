@@ -34,7 +34,7 @@ def with_clock(
             has_counting_clock=found.kind == "utc_counter",
             utc_readings=found.readings,
         )
-        return header, [_timed(one, kind=found.kind) for one in sections], found.remarks
+        return header, [_timed(one, kind=found.kind, modulus_ns=found.modulus_ns) for one in sections], found.remarks
     return header, list(sections), ()
 
 

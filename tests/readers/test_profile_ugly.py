@@ -277,3 +277,18 @@ def test_a_delay_in_milliseconds_is_no_counter(write: Write) -> None:
     at = write("a.csv", table("UTC,Latency (ms),Lat,Lon", *cells))
     draft = new_profile(at)
     assert draft.time_names == ("UTC",) and "rows repeat" in draft.time.doubt
+
+
+@pytest.mark.parametrize("bits", [16, 32])
+def test_a_counter_beside_utc_that_wraps_is_counted_on(write: Write, bits: int) -> None:
+    counts = [((1 << bits) - 30_000 + 250 * t) for t in range(800)]
+    cells = (
+        f"2021-03-12 12:{(t + 1) // 240:02d}:{(t + 1) // 4 % 60:02d},{count % (1 << bits)},55.{t},37.{t}"
+        for t, count in enumerate(counts)
+    )
+    at = write("a.csv", table("UTC,Counter (ms),Lat,Lon", *cells))
+    read = Read(at, drafted(at)[0])
+    assert read.times("gnss") == [count * 10**6 for count in counts]
+    first = read.header.utc_of_zero_ns + counts[0] * 10**6
+    assert first == iso_to_utc_ns("2021-03-12T12:00:00.25Z")[0]
+    assert "counter_wraps" in read.remarks and "agree within 0.00 s" in read.remarks["utc_from_seconds"].text
