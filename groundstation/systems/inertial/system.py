@@ -115,6 +115,12 @@ def _outcome_units() -> type:
     return UnitsOutcome
 
 
+def _study_units_over_time() -> "Callable[..., StudyResult]":
+    from groundstation.systems.inertial.study.units_over_time import study_units_over_time
+
+    return study_units_over_time
+
+
 SYSTEM = System(
     name="inertial",
     analyses=(INERTIAL, FORECAST, UNITS),
@@ -129,6 +135,11 @@ SYSTEM = System(
             "several INS of one flight: false alarms, faults found and named, coverage of the table's intervals",
             _study_units,
             _outcome_units,
+        ),
+        Study(
+            "units_over_time",
+            "histories of INS units: false changes, coverage of slopes, levels and dates",
+            _study_units_over_time,
         ),
     ),
     chapters=_chapters,
