@@ -71,7 +71,7 @@ def counted_utc(source: Source, section: TableSection) -> CountedUtc:
 
 
 def _modulus_ns(counter_ns: Int64Array, utc_ns: Int64Array, tick_ns: int) -> int:
-    """Return the nanoseconds after which a counter begins anew while UTC goes on; 0 where it does not.
+    """Return the period of a counter that begins anew while UTC goes on, ns; 0 of none.
 
     A restart is none: UTC then stands still for longer, or the counter falls from no such number.
 
