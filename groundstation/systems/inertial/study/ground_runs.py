@@ -1,4 +1,4 @@
-"""Flights of the study of alignment and shutdown: each simulated, judged, a small outcome kept."""
+"""Flights of the study of alignment and shutdown: simulated, judged, kept small."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
