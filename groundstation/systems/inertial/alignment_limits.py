@@ -1,4 +1,4 @@
-"""Drift of the ground speed that honest units hardly exceed while they stand after alignment.
+"""Drift of the ground speed that honest units hardly exceed while they stand.
 
 ``alignment_limits.toml`` beside this file has it by class and length of the stand, written by
 ``python -m groundstation.systems.inertial.study.ground_limits``.

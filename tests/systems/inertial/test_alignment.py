@@ -20,6 +20,7 @@ from groundstation.systems.inertial.alignment_ends import drift_limit_mps2
 from groundstation.systems.inertial.alignment_findings import assess_ground, told_by_ground
 from groundstation.systems.inertial.alignment_plots import ground_marks
 from groundstation.systems.inertial.analysis import INERTIAL
+from groundstation.systems.inertial.gives import given_by
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.study.ground import coverage_of, told_of
 from groundstation.systems.inertial.study.ground_runs import CASES, judge_parked
@@ -305,3 +306,14 @@ def test_the_study_holds_every_interval_against_the_truth() -> None:
     table = coverage_of([outcome, off])
     assert set(table["values"].tolist()) <= {2, 4} and max(table["inside95"].tolist()) <= 0.5
     assert told_of([outcome])["kind"].tolist() == [1.0]
+
+
+def test_check_lists_each_part_of_the_page_in_a_line() -> None:
+    made = parked()
+    known = Known(Phases((), "not asked for"), settings={"inertial": SETTINGS})
+    lines = given_by(made.log, known, SETTINGS)
+    assert [line.partition(":")[0] for line in lines] == ["causes", "alignment", "shutdown"]
+    assert "in axes of the body too" in lines[0]
+    valve = changed(made.log, "ins", magnetic_heading_deg=made.log["ins"].values("true_heading_deg"))
+    assert given_by(valve, known, SETTINGS)[-1].startswith("flux valve: the magnetic heading of ins")
+    assert not any(line.startswith("causes") for line in given_by(replace(made.log, tables={}), known, SETTINGS))

@@ -1,4 +1,4 @@
-"""Monte Carlo study of alignment and shutdown: coverage of every interval, and what is told."""
+"""Monte Carlo study of alignment and shutdown: coverage, and what is told."""
 
 import time
 from collections.abc import Sequence

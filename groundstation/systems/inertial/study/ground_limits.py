@@ -1,4 +1,4 @@
-"""Limits of the drift while standing, from simulated stands of each class, written as TOML.
+"""Limits of the drift while standing, from simulated stands, written as TOML.
 
 ``python -m groundstation.systems.inertial.study.ground_limits`` writes the file beside the method.
 """
@@ -24,7 +24,7 @@ CLASSES = ("i-21", "mems", "navigation", "tactical")
 
 
 def slopes_while_standing(ins_class: str, stands: int) -> FloatArray:
-    """Return the lengths of the velocity slopes of stands after alignment, shape (stands, lengths).
+    """Return the lengths of the velocity slopes of stands, shape (stands, lengths).
 
     Half of the stands are those of instruments of their own.
     """

@@ -1,4 +1,4 @@
-"""Flights of the study of alignment and shutdown: each simulated, judged, a small outcome kept."""
+"""Flights of the study of alignment and shutdown: simulated, judged, kept small."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -71,7 +71,7 @@ def run_ground(
     is_over: Callable[[], bool] = lambda: False,
 ) -> list[GroundOutcome]:
     """Fly every case so many times."""
-    found = []
+    found: list[GroundOutcome] = []
     for run in range(runs):
         for number, (name, settings) in enumerate(CASES.items()):
             if is_over():
