@@ -12,16 +12,20 @@ FloatArray = NDArray[np.float64]
 HORIZON_DAYS = 3652.5  # a date further ahead is not stated
 STEP_DAYS = 1.0
 SMALLEST = 1e-12
+CLIPPED = 4.0  # robust sigmas beyond which a flight is drawn in
 
 
 @dataclass(frozen=True)
 class SeriesSettings:
     """Settings of the search for changes in the series of a unit.
 
-    A unit has five figures: with 0.01 each at most 5 % of steady units show a change in any.
+    A unit has five figures: with 0.01 each at most 5 % of steady units show a change in any. ``false_steps`` is the
+    chance of steps being called in a series that has a slope; ``draws`` orders tell it.
     """
 
     changes: ChangeSettings = field(default_factory=lambda: ChangeSettings(false_change=0.01))
+    false_steps: float = 0.01
+    draws: int = 999
 
 
 @dataclass(frozen=True)
@@ -66,31 +70,62 @@ def series_of(
     Notes
     -----
     Changes are those of :func:`groundstation.methods.fleet.changes.find_changes`, whose rate of false ones holds for
-    any distribution. A slope looks to it like steps: where a line through all flights explains them no worse than the
-    steps do (sum of distances, with the price of each parameter as of Schwarz, 1978, for Laplace's distribution), the
-    steps are taken back and looked for about the line.
+    any distribution. A slope looks to it like steps: unless a step explains the flights better than a line does, by
+    more than it would by chance if the line were true (its residuals in random orders), the steps are taken back and
+    looked for about the line.
     """
-    limits = (settings or SeriesSettings()).changes
+    settings = settings or SeriesSettings()
+    limits = settings.changes
     shown = np.log(np.maximum(value, SMALLEST)) if is_positive else value
     found, is_sloped = find_changes(shown, settings=limits), False
-    whole = line_of(day, shown) if found else None
-    if found and whole is not None and len(shown) == whole.flights:
-        about = shown - whole.at(day)
-        steps = shown - _levels(shown, found)
-        if _price(about, 2) <= _price(steps, 2 * len(found) + 1):
-            found, is_sloped = find_changes(about, settings=limits), True
+    curve = _curve_of(day, value, shown, is_positive=is_positive) if found else None
+    if curve is not None and _chance_of_steps(day, shown, curve, settings) > settings.false_steps:
+        found, is_sloped = find_changes(shown - curve, settings=limits), True
     since = found[-1].index if found else 0
     return UnitSeries(found, line_of(day[since:], value[since:]), since, is_sloped)
 
 
-def _levels(value: FloatArray, changes: tuple[Change, ...]) -> FloatArray:
-    parts = np.split(value, [change.index for change in changes])
-    return np.concatenate([np.full(len(part), np.median(part)) for part in parts])
+def _curve_of(day: FloatArray, value: FloatArray, shown: FloatArray, *, is_positive: bool) -> FloatArray | None:
+    """Return the line through a series; of a positive one that of values or logarithms, whichever is nearer."""
+    line = line_of(day, shown)
+    if line is None:
+        return None
+    curves = [line.at(day)]
+    plain = line_of(day, value) if is_positive else None
+    if plain is not None and np.all(plain.at(day) > 0.0):
+        curves.append(np.log(plain.at(day)))
+    return min(curves, key=lambda one: float(np.sum(np.abs(shown - one))))
 
 
-def _price(residual: FloatArray, parameters: int) -> float:
-    n = len(residual)
-    return 2.0 * n * float(np.log(np.mean(np.abs(residual)) + SMALLEST)) + parameters * float(np.log(n))
+def _chance_of_steps(day: FloatArray, shown: FloatArray, curve: FloatArray, settings: SeriesSettings) -> float:
+    """Return the chance that a step would explain flights about a curve so much better than the curve does.
+
+    The residuals of the curve are put in random orders; wild ones are drawn in before.
+    """
+    residual = shown - curve
+    middle = float(np.median(residual))
+    spread = float(np.median(np.abs(residual - middle))) / 0.674490
+    residual = np.clip(residual, middle - CLIPPED * spread, middle + CLIPPED * spread)
+    rng = np.random.default_rng([settings.changes.seed, len(shown)])
+    orders = rng.permuted(np.tile(residual, (settings.draws, 1)), axis=1)
+    gains = _gain_of_step(day, np.vstack([residual, orders]) + curve, curve, settings.changes.fewest_in_level)
+    return float((1 + np.sum(gains[1:] >= gains[0] - 1e-12)) / (1 + settings.draws))
+
+
+def _gain_of_step(day: FloatArray, rows: FloatArray, curve: FloatArray, fewest: int) -> FloatArray:
+    """Logarithm of what a line or the curve leaves, less that of what the best step leaves, a row each."""
+    n = rows.shape[1]
+
+    def left(about: FloatArray) -> FloatArray:
+        return np.asarray(np.sum((about - about.mean(axis=1, keepdims=True)) ** 2, axis=1))
+
+    total, time = left(rows), day - day.mean()
+    sloped = total - (rows @ time) ** 2 / max(float(time @ time), SMALLEST)
+    smooth = np.minimum(sloped, left(rows - curve))
+    before = np.arange(fewest, n - fewest + 1)
+    sums = np.cumsum(rows - rows.mean(axis=1, keepdims=True), axis=1)[:, before - 1]
+    stepped = total - np.max(sums**2 * (n / (before * (n - before))), axis=1)
+    return np.asarray(np.log(np.maximum(smooth, SMALLEST)) - np.log(np.maximum(stepped, SMALLEST)))
 
 
 def crossing_of(day: FloatArray, value: FloatArray, limit: float) -> Crossing:

@@ -143,6 +143,12 @@ def _outcome_ground() -> type:
     return GroundOutcome
 
 
+def _study_units_over_time() -> "Callable[..., StudyResult]":
+    from groundstation.systems.inertial.study.units_over_time import study_units_over_time
+
+    return study_units_over_time
+
+
 SYSTEM = System(
     name="inertial",
     analyses=(INERTIAL, CAUSES, FORECAST, UNITS, GROUND),
@@ -168,6 +174,11 @@ SYSTEM = System(
             "alignment and shutdown of an INS: coverage of tilt, azimuth, drift while standing and residual speed",
             _study_ground,
             _outcome_ground,
+        ),
+        Study(
+            "units_over_time",
+            "histories of INS units: false changes, coverage of slopes, levels and dates",
+            _study_units_over_time,
         ),
     ),
     chapters=_chapters,
