@@ -122,9 +122,14 @@ def _inertial_units() -> list[dict[str, Any]]:
 
 
 def _several_ins() -> list[dict[str, Any]]:
+    from groundstation.simulation.ins_units.fleet import load_units_fleet, units_fleet_names
     from groundstation.simulation.ins_units.scenario import load_units_scenario, units_scenario_names
 
-    return [
+    fleets = [
+        {"kind": "scenario", "name": name, "title": load_units_fleet(name).title, "needs": "nothing"}
+        for name in units_fleet_names()
+    ]
+    return fleets + [
         {"kind": "scenario", "name": name, "title": load_units_scenario(name).title, "needs": "nothing"}
         for name in units_scenario_names()
     ]

@@ -35,8 +35,9 @@ def simulate_to(
 
     With ``form`` ch10 it is ``<scenario>.ch10``, and the ICD of its buses ``<scenario>.icd.yaml``. A session of several
     aircraft gives one log for each, ``<folder>/<session>-<aircraft>.csv``, with stations.toml and settings.toml beside
-    them; landing aids give the site file that belongs to them, ``<scenario>.site.toml``. A log of an inertial unit can
-    be ULog (``.ulg``), DataFlash (``.BIN``) or a ROS 1 bag as well, with ``<scenario>.truth.csv`` beside it.
+    them; a fleet gives a log for each flight, ``<folder>/<fleet>-<period>-<flight>.csv``; landing aids give the site
+    file that belongs to them, ``<scenario>.site.toml``. A log of an inertial unit can be ULog
+    (``.ulg``), DataFlash (``.BIN``) or a ROS 1 bag as well, with ``<scenario>.truth.csv`` beside it.
 
     Raises
     ------
@@ -54,6 +55,10 @@ def simulate_to(
         return _imu_to(scenario, folder, seed, form, force=force)
     if form not in {"csv", "ch10"}:
         raise UsageError(scenario, f"--format {form}", "csv or ch10, or a scenario of an inertial unit (imu-uav)")
+    if is_units_fleet(scenario):
+        if form != "csv":
+            raise UsageError(scenario, f"--format {form}", "a scenario of one flight")
+        return _units_fleet_to(scenario, folder, seed, force=force)
     if form != "csv" and (is_session(scenario) or is_approach(scenario) or has_units(scenario)):
         raise UsageError(scenario, f"--format {form}", "a scenario of one flight")
     if is_session(scenario):
@@ -133,6 +138,19 @@ def has_units(scenario: str) -> bool:
     return isinstance(flown, dict) and "units" in flown
 
 
+def is_units_fleet(scenario: str) -> bool:
+    """Tell whether a scenario is a fleet whose INS are followed over months.
+
+    A shipped name of such, or a TOML file with ``[[flown]]``.
+    """
+    from groundstation.simulation.ins_units.fleet import units_fleet_names
+
+    if not scenario.endswith(".toml"):
+        return scenario.lower() in units_fleet_names()
+    path = Path(scenario)
+    return path.is_file() and isinstance(read_toml(path).get("flown"), list)
+
+
 def _imu_to(name: str, folder: Path, seed: int | None, form: Form, *, force: bool) -> list[Path]:
     from groundstation.simulation.imu.dataflash import write_dataflash
     from groundstation.simulation.imu.ros_bag import write_ros1
@@ -176,6 +194,16 @@ def _units_to(name: str, folder: Path, seed: int | None, *, force: bool) -> Path
     if target.exists() and not force:
         raise UsageError(str(target), "a file that exists", "a new folder", "-f overwrites it")
     return write_units(scenario, folder, seed)
+
+
+def _units_fleet_to(name: str, folder: Path, seed: int | None, *, force: bool) -> list[Path]:
+    from groundstation.simulation.ins_units.fleet import load_units_fleet, write_units_fleet
+
+    fleet = load_units_fleet(name)
+    there = [folder / one.log_name for one in fleet.scenarios() if (folder / one.log_name).exists()]
+    if there and not force:
+        raise UsageError(str(there[0]), "a file that exists", "a new folder", "-f overwrites it")
+    return write_units_fleet(fleet, folder, seed)
 
 
 def _session_to(name: str, folder: Path, seed: int | None, *, force: bool) -> list[Path]:

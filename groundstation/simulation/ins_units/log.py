@@ -105,8 +105,12 @@ def _metadata(flight: UnitsFlight, scenario: UnitsScenario, start_ns: int) -> di
     found = {"aircraft": scenario.aircraft, "flight": scenario.name, "start_utc": _iso(start_ns)}
     if isinstance(flight.settings.ins, str):
         found["ins_class"] = flight.settings.ins
+    stated = dict(zip((unit.topic for unit in flight.units), scenario.serials, strict=False))
     for unit in flight.units:
         (_from_s, first), *later = unit.serials
+        first = stated.get(unit.topic, first)
+        if not first:
+            continue
         text = ", ".join([first, *(f"{serial} from {from_s:g}" for from_s, serial in later)])
         found["ins_serial" if unit.topic == "ins" else f"ins_serial.{unit.topic}"] = text
     if flight.settings.states_start:

@@ -16,7 +16,10 @@ _SCENARIOS = ShippedToml("groundstation.simulation.ins_units", "scenarios", "sce
 
 @dataclass(frozen=True)
 class UnitsScenario:
-    """Everything that determines the log of a flight with several units."""
+    """Everything that determines the log of a flight with several units.
+
+    ``serials`` are those of the units in place of the usual ones; an empty one is not stated.
+    """
 
     name: str = "units"
     title: str = ""
@@ -24,6 +27,7 @@ class UnitsScenario:
     run: int = number(0, 0)
     aircraft: str = "SIM-UNITS"
     start_utc: str = "2026-05-04T06:00:00Z"
+    serials: tuple[str, ...] = ()
     with_truth: bool = False
     flown: UnitsSettings = field(default_factory=UnitsSettings)
 
