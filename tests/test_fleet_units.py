@@ -101,7 +101,7 @@ def test_too_few_flights_give_no_line_and_no_date() -> None:
     assert line_of(np.arange(5.0), np.arange(5.0)) is None and line_of(np.zeros(9), np.arange(9.0)) is None
     row = only(histories_of(flown(steady(4)), LIMITS))
     assert (row.outlook, row.flights_missing, row.due_utc_ns) == ("few", FEWEST - 4, None)
-    assert "2 more are needed" in row.text and row.rate_nmiph is not None and row.slope_nmiph_per_year is None
+    assert "2 more needed" in row.text and row.rate_nmiph is not None and row.slope_nmiph_per_year is None
     assert only(histories_of(flown([0.7]), LIMITS)).flights_missing == FEWEST - 1
 
 

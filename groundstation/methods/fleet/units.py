@@ -39,6 +39,7 @@ FIRST_YEAR = 1990  # a clock that was never set counts from 1970 or 1980
 NO_DATE = "no date in the log"
 CLOCK = f"dated before {FIRST_YEAR}: its clock was not set"
 BOTH = "the same serial flies in two aircraft at the same time"
+SOON_DAYS = 7.0  # an earliest date so near tells nothing
 MOST_MISSING = 1000  # flights more: a larger number tells nothing
 
 
@@ -329,10 +330,10 @@ def _outlook(
     line, since = found.line, len(counted) - found.since
     if line is None:
         missing = max(FEWEST - since, 1)
+        flights = "1 flight" if since == 1 else f"{since} flights"
         word = "since its last change " if found.since else ""
-        return _Outlook(
-            "few", f"{since} flights {word}with a rate: {missing} more are needed, no date", missing=missing
-        )
+        text = f"{flights} {word}with a rate: {missing} more needed, no date"
+        return _Outlook("few", text, missing=missing)
     if limit is None:
         return _Outlook("few", "no limit is stated and its class has none: no date")
     latest = counted[found.since :]
@@ -363,13 +364,15 @@ def _outlook(
         until = "in ten years" if crossing.earliest is None else f"before {_date(crossing.earliest)}"
         rises = "rises, but" if line.slope_low > 0.0 else "no trend:"
         return _Outlook("steady", f"{rises} does not reach {limit:.2f} nmi/h {until}", earliest=crossing.earliest)
-    missing = flights_missing(line, limit, float(day[-1]), period)
-    more = "more flights" if not missing else f"about {_count(missing)} more flights"
+    needed = flights_missing(line, limit, float(day[-1]), period)
+    more = f"about {_count(needed)} more flights" if needed else "more flights"
+    soon = crossing.earliest - float(day[-1]) < SOON_DAYS
+    end = "no date" if soon else f"not before {_date(crossing.earliest)}"
     return _Outlook(
         "few",
-        f"no trend is shown, nor excluded: {more} are needed, not before {_date(crossing.earliest)}",
-        earliest=crossing.earliest,
-        missing=min(missing, MOST_MISSING) if missing else None,
+        f"no trend is shown, nor excluded: {more} are needed, {end}",
+        earliest=None if soon else crossing.earliest,
+        missing=min(needed, MOST_MISSING) if needed else None,
     )
 
 
@@ -388,12 +391,12 @@ def _moves(serial: str, own: Sequence[FlownUnit], limits: UnitLimits) -> Iterato
         assert one.start_utc_ns is not None
         assert other.start_utc_ns is not None
         place = (serial, other.aircraft, other.flight_id, other.start_utc_ns)
-        if one.aircraft != other.aircraft:
+        if one.aircraft != other.aircraft and one.reason == other.reason == BOTH:
+            yield UnitEventRow("two_aircraft", *place, f"in {one.aircraft} and {other.aircraft} at the same time")
+        elif one.aircraft != other.aircraft and BOTH not in (one.reason, other.reason):
             told = f"removed from {one.aircraft} after {_day(one.start_utc_ns)}, fitted to {other.aircraft} by "
             yield UnitEventRow("moved", *place, f"{told}{_day(other.start_utc_ns)}")
-            if BOTH in (one.reason, other.reason):
-                yield UnitEventRow("two_aircraft", *place, f"in {one.aircraft} and {other.aircraft} at the same time")
-            elif _day(one.start_utc_ns) == _day(other.start_utc_ns):
+            if _day(one.start_utc_ns) == _day(other.start_utc_ns):
                 told = f"in {one.aircraft} and {other.aircraft} on {_day(one.start_utc_ns)}: check the serial"
                 yield UnitEventRow("two_aircraft", *place, told)
         days = (other.start_utc_ns - one.start_utc_ns) / NS_PER_DAY

@@ -81,7 +81,7 @@ class UnitsFleet:
 
     def scenarios(self) -> tuple[UnitsScenario, ...]:
         """Return the scenario of each flight."""
-        found = []
+        found: list[UnitsScenario] = []
         for place, period in enumerate(self.flown, 1):
             for flight in range(period.flights):
                 start_ns = iso_to_utc_ns(period.first_utc)[0] + round(flight * period.every_days * NS_PER_DAY)

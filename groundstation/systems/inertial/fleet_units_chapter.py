@@ -27,6 +27,7 @@ EVENTS = {
     "spelled_alike": "spelled alike",
 }
 DOUBTS = ("two_aircraft", "clock", "spelled_alike")
+LIMIT_BY = {"stated": "stated"}  # every other is that of a class
 LONGEST = 28  # characters of a serial
 
 
@@ -84,31 +85,30 @@ def _notes(fleet: FleetResults) -> list[Part]:
 
 def _table(fleet: FleetResults) -> Grid:
     heads = (
-        *(Head("Serial"), Head("Aircraft"), Head("Flights", True), Head("with a rate", True), Head("Last flight")),
-        *(Head("Rate now, nmi/h", True), Head("95 %", True), Head("per year", True), Head("95 %", True)),
-        *(Head("Limit", True), Head("Outlook")),
+        *(Head("Serial"), Head("Aircraft"), Head("Outlook"), Head("Flights", True)),
+        *(Head("Rate now, nmi/h", True), Head("per year", True), Head("Limit", True)),
     )
     rows = [_row(one) for one in fleet.units]
     caption = (
-        "Rate now: the line at the last flight, by the median of all pairs of flights since the last change; without "
-        "an interval the median of the flights. Intervals are from the scatter between flights. A limit of the class "
-        "is what an honest unit exceeds in one of 250 flights of that length; --unit-limits states your own."
+        "Flights: those with a rate that counts. Rate now: the line at the last flight, by the median of all pairs of flights since the last change; without "
+        "an interval the median of the flights. In brackets 95 %, from the scatter between flights. A limit of the "
+        "class is what an honest unit exceeds in one of 250 flights of that length; --unit-limits states your own."
     )
     return Grid("Units", heads, rows, caption)
 
 
 def _row(one: FleetUnitRow) -> tuple[Cell, ...]:
-    limit = "" if one.limit_nmiph is None else f"{bounded(one.limit_nmiph, 2)} ({clean(one.limit_by)})"
-    text = clean(one.text)
+    limit = (
+        ABSENT if one.limit_nmiph is None else f"{bounded(one.limit_nmiph, 2)}, {LIMIT_BY.get(one.limit_by, 'class')}"
+    )
+    rate, slope = bounded(one.rate_nmiph, 2), bounded(one.slope_nmiph_per_year, 2, signed=True)
+    slopes = _span(one.slope_low_nmiph_per_year, one.slope_high_nmiph_per_year, 2, signed=True)
     return (
-        *(serial_name(one.ins_serial), _aircraft(one), number(one.flights, 0), number(one.counted, 0)),
-        ABSENT if one.last_utc_ns is None else day(np.datetime64(one.last_utc_ns, "ns")),
-        bounded(one.rate_nmiph, 2),
-        _span(one.rate_low_nmiph, one.rate_high_nmiph, 2),
-        bounded(one.slope_nmiph_per_year, 2, signed=True),
-        _span(one.slope_low_nmiph_per_year, one.slope_high_nmiph_per_year, 2, signed=True),
-        limit or ABSENT,
-        _mark(one.outlook, text),
+        *(serial_name(one.ins_serial), _aircraft(one), _mark(one.outlook, clean(one.text))),
+        f"{number(one.counted, 0)} of {number(one.flights, 0)}",
+        f"{rate} ({_span(one.rate_low_nmiph, one.rate_high_nmiph, 2)})" if is_number(one.rate_low_nmiph) else rate,
+        f"{slope} ({slopes})" if is_number(one.slope_nmiph_per_year) else slope,
+        limit,
     )
 
 
@@ -149,11 +149,12 @@ def _figures(fleet: FleetResults) -> Grid | None:
 
 def _figure(one: UnitTrendRow) -> tuple[Cell, ...]:
     title, unit, places, is_positive = UNIT_FIGURES[one.quantity]
-    signed = not is_positive
+    signed, low = not is_positive, one.level_low
+    low = max(low, 0.0) if is_positive and low is not None else low
     return (
         *(serial_name(one.ins_serial), f"{title}, {unit}", number(one.flights, 0)),
         bounded(one.level, places, signed=signed),
-        _span(one.level_low, one.level_high, places, signed=signed),
+        _span(low, one.level_high, places, signed=signed),
         bounded(one.slope_per_year, places, signed=True),
         _span(one.slope_low_per_year, one.slope_high_per_year, places, signed=True),
         bounded(one.scatter, places),

@@ -48,11 +48,10 @@ def over_dates(fleet: FleetResults) -> Plot | None:
         "fleet.units",
         "Rate of each unit over time",
         "A dot for each flight, with the 95 % interval of its measurement where it has one; line and band: trend since "
-        "the last change with its 95 % interval; dotted: the unit flies in another aircraft; numbered c: a change of "
-        f"level; dashed: the limit.{more}",
+        "the last change with its 95 % interval; dotted: the unit flies in another aircraft; c: a change of level; "
+        f"dashed: the limit.{more}",
         "Radial error rate of each INS unit by serial over dates, with trend, moves, changes and limit.",
         tuple(Row((panel,), PANEL_MM, shares_x=panel is not panels[-1]) for panel in panels),
-        ("unit_flights",),
     )
 
 
@@ -103,9 +102,7 @@ def chart(fleet: FleetResults, one: FleetUnitRow, x: Axis, places: Places) -> Pa
         marks.append(
             Bars(x=at[has_half], y=own.rate_nmiph, half=own.rate_nmiph_half95, role="ins", name="flight, 95 %")
         )
-    if not has_half.all():
-        bare = ~has_half
-        marks.append(Dots(x=at[bare], y=table.rate_nmiph[bare], role="ins", name="flight", emphasis="bold"))
+    marks.append(Dots(x=at, y=table.rate_nmiph, role="ins", name="flight", emphasis="bold"))
     highest = float(np.max(table.rate_nmiph)) if len(table) else 1.0
     if one.limit_nmiph is not None and one.limit_nmiph <= FAR * highest:
         marks.append(Limit(value=one.limit_nmiph, role="limit", name="limit"))

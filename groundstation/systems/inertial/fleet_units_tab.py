@@ -1,7 +1,11 @@
 """Tab of the recording of a fleet: the INS units by serial."""
 
+from dataclasses import replace
+
 import rerun.blueprint as rrb
 
+from groundstation.plots.marks import AnyMark, Band, Bars, Curve
+from groundstation.plots.plot import Panel
 from groundstation.results.fleet import FleetResults
 from groundstation.systems.inertial.fleet_units_chapter import build, serial_name, shown
 from groundstation.systems.inertial.fleet_units_plots import MOST_PANELS, chart
@@ -28,7 +32,7 @@ def units(recorder: FleetRecorder, fleet: FleetResults) -> rrb.Container | None:
         over_time(
             recorder,
             f"units/{name}",
-            chart(fleet, one, BY_NUMBER, recorder.places),
+            _with_ends(chart(fleet, one, BY_NUMBER, recorder.places)),
             f"{serial_name(one.ins_serial)}: rate, nmi/h",
         )
         for one, name in zip(rows, names, strict=True)
@@ -38,3 +42,15 @@ def units(recorder: FleetRecorder, fleet: FleetResults) -> rrb.Container | None:
         return rrb.Horizontal(contents=[text], name="INS units")
     grid = rrb.Grid(contents=views, grid_columns=1 if len(views) < 4 else 2)
     return rrb.Horizontal(contents=[grid, text], column_shares=[1.0, 1.0], name="INS units")
+
+
+def _with_ends(panel: Panel) -> Panel:
+    """Return the panel with the ends of the interval as lines: they are uneven about the trend."""
+    marks: list[AnyMark] = []
+    for mark in panel.marks:
+        if isinstance(mark, Band):
+            ends = ((mark.low, mark.name), (mark.high, ""))
+            marks += [Curve(x=mark.x, y=y, role="faint", name=name, emphasis="thin") for y, name in ends]
+        elif not isinstance(mark, Bars):
+            marks.append(mark)
+    return replace(panel, marks=tuple(marks))

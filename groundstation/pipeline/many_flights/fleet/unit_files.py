@@ -13,7 +13,7 @@ from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.figures import FigureData
 from groundstation.results.files import csv_text, write_text
 from groundstation.results.fleet import FleetResults
-from groundstation.results.fleet_units import FleetUnitRow, UnitLimits
+from groundstation.results.fleet_units import FleetUnitFlights, FleetUnitRow, UnitLimits
 
 UNITS_CSV, UNIT_FLIGHTS_CSV = "units.csv", "unit_flights.csv"
 UNIT_LIMITS = "unit_limits.toml"
@@ -65,7 +65,7 @@ def write_units(out: Path, fleet: FleetResults) -> tuple[Outcome, ...]:
     problems = []
     if told := _problem_of_limits(out):
         problems.append(Outcome(str(out / UNIT_LIMITS), "failed", told, is_beside=True))
-    tables = {UNITS_CSV: units_table(fleet.units), UNIT_FLIGHTS_CSV: fleet.unit_flights}
+    tables = {UNITS_CSV: units_table(fleet.units), UNIT_FLIGHTS_CSV: flights_table(fleet.unit_flights)}
     for name, table in tables.items():
         try:
             if fleet.units:
@@ -76,6 +76,13 @@ def write_units(out: Path, fleet: FleetResults) -> tuple[Outcome, ...]:
             text = f"{out}: {name} cannot be written ({error.strerror or error})"
             problems.append(Outcome(str(out), "failed", text, is_beside=True))
     return tuple(problems)
+
+
+def flights_table(flights: FleetUnitFlights) -> FigureData:
+    """Return every INS of every flight as columns; times are ISO 8601, UTC."""
+    times = flights.start_utc.astype("datetime64[s]")
+    told = np.where(np.isnat(times), "", np.char.add(times.astype(np.str_), "Z"))
+    return FigureData("unit_flights", {**flights.columns, "start_utc": told}, flights.digits)
 
 
 def units_table(rows: tuple[FleetUnitRow, ...]) -> FigureData:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from groundstation.methods.fleet.confidence import share_high, share_low
 from groundstation.methods.fleet.units import FlownUnit, histories_of
 from groundstation.results.figures import FigureData
-from groundstation.results.fleet_units import RATE, FleetUnitRow, UnitLimits, UnitOfFlight
+from groundstation.results.fleet_units import FleetUnitRow, UnitLimits, UnitOfFlight
 from groundstation.systems.study import StudyResult, section, table
 
 FloatArray = NDArray[np.float64]
@@ -123,7 +123,7 @@ def judge(history: History, flights: int, rng: np.random.Generator) -> JudgedHis
     rates = truth * _scatter(history, flights, rng)
     flown = [
         FlownUnit(
-            UnitOfFlight("ins", "S-1", ins_class="navigation", **{RATE: float(rate)}),
+            UnitOfFlight("ins", "S-1", ins_class="navigation", rate_nmiph=float(rate)),
             f"F{place:04d}",
             "RA-1",
             START_NS + int(when * NS_PER_DAY),
