@@ -1,4 +1,4 @@
-"""Study of the histories of INS units: slopes, changes, dates, on the family of docs/inertial.md.
+"""Study of the histories of INS units: slopes, changes and dates, as docs/fleet.md has them.
 
 Rates are drawn, not flown: what is judged is the statistics over flights.
 """
