@@ -86,7 +86,10 @@ def series_of(
 
 
 def _curve_of(day: FloatArray, value: FloatArray, shown: FloatArray, *, is_positive: bool) -> FloatArray | None:
-    """Return the line through a series; of a positive one that of values or logarithms, whichever is nearer."""
+    """Return the line through a series.
+
+    Of a positive one it is that of values or of logarithms, whichever is nearer.
+    """
     line = line_of(day, shown)
     if line is None:
         return None
@@ -98,7 +101,7 @@ def _curve_of(day: FloatArray, value: FloatArray, shown: FloatArray, *, is_posit
 
 
 def _chance_of_steps(day: FloatArray, shown: FloatArray, curve: FloatArray, settings: SeriesSettings) -> float:
-    """Return the chance that a step would explain flights about a curve so much better than the curve does.
+    """Return the chance that a step explains flights about a curve so much better.
 
     The residuals of the curve are put in random orders; wild ones are drawn in before.
     """
@@ -113,7 +116,10 @@ def _chance_of_steps(day: FloatArray, shown: FloatArray, curve: FloatArray, sett
 
 
 def _gain_of_step(day: FloatArray, rows: FloatArray, curve: FloatArray, fewest: int) -> FloatArray:
-    """Logarithm of what a line or the curve leaves, less that of what the best step leaves, a row each."""
+    """Return the gain of the best step over a line or the curve, a row each.
+
+    It is the logarithm of what these leave less that of what the step leaves.
+    """
     n = rows.shape[1]
 
     def left(about: FloatArray) -> FloatArray:

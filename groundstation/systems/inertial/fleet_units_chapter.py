@@ -90,9 +90,10 @@ def _table(fleet: FleetResults) -> Grid:
     )
     rows = [_row(one) for one in fleet.units]
     caption = (
-        "Flights: those with a rate that counts. Rate now: the line at the last flight, by the median of all pairs of flights since the last change; without "
-        "an interval the median of the flights. In brackets 95 %, from the scatter between flights. A limit of the "
-        "class is what an honest unit exceeds in one of 250 flights of that length; --unit-limits states your own."
+        "Flights: those with a rate that counts. Rate now: the line at the last flight, by the median of all pairs of "
+        "flights since the last change; without an interval the median of the flights. In brackets 95 %, from the "
+        "scatter between flights. A limit of the class is what an honest unit exceeds in one of 250 flights of that "
+        "length; --unit-limits states your own."
     )
     return Grid("Units", heads, rows, caption)
 

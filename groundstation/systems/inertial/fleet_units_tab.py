@@ -45,7 +45,7 @@ def units(recorder: FleetRecorder, fleet: FleetResults) -> rrb.Container | None:
 
 
 def _with_ends(panel: Panel) -> Panel:
-    """Return the panel with the ends of the interval as lines: they are uneven about the trend."""
+    """Return the panel with the ends of the interval as lines, uneven about the trend."""
     marks: list[AnyMark] = []
     for mark in panel.marks:
         if isinstance(mark, Band):

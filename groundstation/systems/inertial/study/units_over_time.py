@@ -1,4 +1,4 @@
-"""Study of the histories of INS units: slopes, changes, dates, on the family of docs/inertial.md.
+"""Study of the histories of INS units (docs/fleet.md): slopes, changes and dates.
 
 Rates are drawn, not flown: what is judged is the statistics over flights.
 """
