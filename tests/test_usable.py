@@ -179,7 +179,7 @@ def test_an_mcap_is_told_as_its_log_is(tmp_path: Path) -> None:
 def test_a_purpose_that_is_none_is_a_usage_error() -> None:
     code, _, error = groundstation("check", SAMPLES / "taxi-good.csv", "--for", "cooking")
     assert code == 2
-    assert "heading, inertial, trajectory, magnetic, landing, health, gnss, cooperative" in error
+    assert "heading, inertial, trajectory, magnetic, magnetic_flux, landing, health, gnss, cooperative" in error
 
 
 def test_a_recorded_flight_is_told_as_it_runs() -> None:

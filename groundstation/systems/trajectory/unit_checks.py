@@ -66,7 +66,7 @@ def _flicker(stays: list[BoolArray], axis: int, start: int, end: int) -> bool:
     """
     first = axis - axis % 3
     others = [stays[one][start:end].mean() for one in range(first, first + 3) if one != axis]
-    return max(others) < 1.0 - FLICKERS
+    return bool(max(others) < 1.0 - FLICKERS)
 
 
 def _stays(samples: UnitSamples, axis: int) -> BoolArray:
