@@ -324,6 +324,7 @@ def hang_or_run(job: Job, listen: Listener) -> Outcome:
     return Outcome(job.log, "done", "")
 
 
+@pytest.mark.slow
 def test_a_log_that_takes_too_long_costs_itself_alone(tmp_path: Path) -> None:
     jobs = [Job(Path(name), tmp_path, Configuration()) for name in ("a", "hang", "b", "c", "d")]
     began = time.monotonic()

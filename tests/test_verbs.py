@@ -104,6 +104,7 @@ def test_list_of_a_log_says_whether_it_would_run_and_why_not(tmp_path: Path) -> 
     assert code == 0 and set(answers) == {
         "heading",
         "inertial",
+        "ins_causes",
         "forecast",
         "latency",
         "magnetic",

@@ -48,7 +48,7 @@ def of_case(case: str) -> Iterator[Plot]:
 def of_fleet() -> Iterator[Plot]:
     fleet = fleet_of(60)
     for name in systems().fleet_plots:
-        if name not in ("fleet.trend", "fleet.deviation", "fleet.installation"):
+        if name not in ("fleet.trend", "fleet.deviation", "fleet.installation", "fleet.units"):
             describe: Any = systems().fleet_plots[name]
             plot = describe(fleet)
             assert plot is not None

@@ -55,7 +55,7 @@ def told_by_ground(flight: Flight) -> tuple[str, ...]:
     Examples
     --------
     >>> from groundstation.tables.assemble import flight_from_batches
-    >>> told_by_ground(flight_from_batches(()))
+    >>> told_by_ground(flight_from_batches((), metadata={}, has_utc=False, source_name="none"))
     ()
     """
     try:

@@ -100,7 +100,7 @@ def _tabs() -> tuple[Tab, ...]:
     from groundstation.systems.inertial.units_tab import units
 
     return (
-        Tab(("inertial",), inertial),
+        Tab(("inertial", "ins_ground"), inertial),
         Tab(("ins_causes",), causes),
         Tab(("ins_units",), units),
         Tab(("forecast",), forecast),

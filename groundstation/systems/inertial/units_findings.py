@@ -74,7 +74,7 @@ def told_by_units(flight: Flight) -> tuple[str, ...]:
     Examples
     --------
     >>> from groundstation.tables.assemble import flight_from_batches
-    >>> told_by_units(flight_from_batches(()))
+    >>> told_by_units(flight_from_batches((), metadata={}, has_utc=False, source_name="none"))
     ()
     """
     topics = unit_topics(flight)

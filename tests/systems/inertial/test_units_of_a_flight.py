@@ -73,7 +73,7 @@ def test_units_of_a_log_are_judged_and_named_by_their_serials() -> None:
 def test_nothing_is_said_of_one_unit() -> None:
     one = flight(1)
     assert not UNITS.applies(one, known_of(one, ORDINARY))
-    assert not usability_of_flight("inertial", one, ORDINARY).gives
+    assert not [line for line in usability_of_flight("inertial", one, ORDINARY).gives if "units" in line]
 
 
 @pytest.mark.parametrize(
@@ -86,7 +86,7 @@ def test_nothing_is_said_of_one_unit() -> None:
 )
 def test_check_tells_what_several_units_give(number: int, has_gnss: bool, says: str) -> None:
     usability = usability_of_flight("inertial", flight(number, has_gnss=has_gnss), ORDINARY)
-    assert usability.gives == (says,) and usability.text.endswith(f"; gives: {says}")
+    assert usability.gives[0] == says and f"; gives: {says}" in usability.text
     assert (usability.state == "no") == (not has_gnss)
 
 

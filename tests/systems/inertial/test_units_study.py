@@ -122,6 +122,7 @@ def case_of(name: str) -> UnitsCase:
     return next(case for case in CASES if f"{case.case} {case.size}".strip() == name)
 
 
+@pytest.mark.slow
 def test_a_judged_flight_names_what_was_put_in() -> None:
     found = judge_flight(case_of("step 1000 m"), 1)  # three units with GNSS
     assert (found.units, found.mode) == (3, "with")

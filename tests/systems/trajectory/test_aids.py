@@ -156,6 +156,7 @@ def rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
+@pytest.mark.slow
 def test_barometer_and_wheels_make_outages_smaller_and_coverage_stays() -> None:
     flight, plain = driven()
     done, rows = aided(plain, aids(flight), ORDINARY, ambiguous_below=10.0)

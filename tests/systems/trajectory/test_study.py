@@ -55,6 +55,7 @@ def test_a_refused_run_is_counted() -> None:
     assert row["refused_share"] == 1.0 and np.isnan(row["coverage"])
 
 
+@pytest.mark.slow
 def test_sigmas_are_near_in_a_few_runs() -> None:
     found = study_trajectory(FAST_RUNS, 5, families=(short(FAMILIES[0]),))
     (table,) = found.tables
