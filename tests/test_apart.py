@@ -102,6 +102,7 @@ run(["leaves_children_and_hangs"], Path(sys.argv[1]), ISOLATED)
 """
 
 
+@pytest.mark.slow
 @LINUX
 def test_a_run_that_is_killed_takes_the_processes_of_its_logs_with_it(tmp_path: Path) -> None:
     process = subprocess.Popen([sys.executable, "-c", PROGRAM, str(tmp_path)])
@@ -163,6 +164,7 @@ def long_log(path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_the_verbs_keep_a_limit_of_time(tmp_path: Path) -> None:
     long = long_log(tmp_path / "long.csv")
     for verb, *more in (("info",), ("check",), ("convert", "-o", str(tmp_path / "out.mcap"))):

@@ -402,6 +402,7 @@ def test_a_flight_without_time_is_kept_under_an_unknown_month(tmp_path: Path) ->
     assert pq.read_table(tmp_path / FLEET_PARQUET)["start_utc"].to_pylist() == [None]
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_samples_of_the_flights(tmp_path: Path) -> None:
     for number in range(8):
         save_flight(tmp_path / ("few" if number < 2 else "many"), number, samples=20_000)

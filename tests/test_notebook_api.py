@@ -272,6 +272,7 @@ def sorted_figures(names: tuple[str, ...]) -> list[str]:
     return [*names[:2], *sorted(names[2:])]
 
 
+@pytest.mark.slow
 def test_settings_of_a_run_come_back_with_its_folder(tmp_path: Path) -> None:
     opened = groundstation.open(GOOD, config={"heading": {"taxi_speed_min_mps": 10.0}})
     assert isinstance(opened, OpenLog)

@@ -53,6 +53,7 @@ def called(*arguments: object) -> tuple[int, str, str]:
     return done.exit_code, done.stdout, done.stderr
 
 
+@pytest.mark.slow
 def test_a_run_writes_pages_and_no_pdf_and_needs_no_typst(finished: Path, tmp_path: Path) -> None:
     assert pdfs_in(finished) == set() and (finished / "summary.html").is_file()
     for page in (finished / "summary.html", flight_in(finished) / "report.html", flight_in(finished) / "summary.json"):

@@ -219,6 +219,7 @@ def test_killed_while_it_waits_for_the_disk_the_next_run_gives_the_same(
     assert_equal_runs(tmp_path, finished)
 
 
+@pytest.mark.slow
 def test_killed_while_a_flight_is_put_into_place_the_next_run_gives_the_same(
     finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

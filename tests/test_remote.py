@@ -267,6 +267,7 @@ def bucket(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     server.stop()
 
 
+@pytest.mark.slow
 def test_a_bucket_lets_one_of_several_runs_begin(bucket: str) -> None:
     out = RemoteFolder(f"{bucket}/out")
     assert begun_together(out) == ["alone", *["refused"] * 7]

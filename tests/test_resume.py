@@ -233,6 +233,7 @@ def tell_and_sleep(job: Job, listen: Listener) -> Outcome:
     return Outcome(job.log, "done", "")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no /proc to look for processes")
 def test_workers_end_with_a_run_that_is_killed(tmp_path: Path) -> None:
     program = (
@@ -294,6 +295,7 @@ def die_or_run(job: Job, listen: Listener) -> Outcome:
     return Outcome(job.log, "done", "")
 
 
+@pytest.mark.slow
 def test_a_process_that_dies_takes_its_own_log_alone(tmp_path: Path) -> None:
     jobs = [Job(Path(name), tmp_path, Configuration()) for name in ("a", "killer", "b", "c")]
     ended = dict(side_by_side(enumerate(jobs), die_or_run, workers=2, listen=silent))

@@ -223,6 +223,7 @@ def test_straight_taxi_after_the_flight_alone_is_not_assessable(tmp_path: Path, 
         assert "heading" not in found["results"], "3 s are too few however they are asked for"
 
 
+@pytest.mark.slow
 def test_copies_of_one_log_are_kept_once_however_many_run_at_a_time(tmp_path: Path) -> None:
     (tmp_path / "logs").mkdir()
     log = "time_s,baro.pressure_altitude_m\n" + "".join(f"{second},100.0\n" for second in range(30))
@@ -266,6 +267,7 @@ def test_damage_of_an_mcap_is_kept_with_it(good: Outcome, tmp_path: Path) -> Non
     assert min(summary["completeness"].values()) < 1.0
 
 
+@pytest.mark.slow
 def test_a_killed_run_keeps_what_was_finished_and_can_go_on(tmp_path: Path) -> None:
     out = tmp_path / "out"
     command = [

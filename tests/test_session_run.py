@@ -303,6 +303,7 @@ def test_the_session_grows_with_its_flights_and_one_of_the_verb_stays(
     assert (by_hand / "manifest.json").read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_run_leaves_what_the_verb_made_of_the_same_logs(out: Path, logs: Path, tmp_path: Path) -> None:
     copy = tmp_path / "out"
     shutil.copytree(out, copy)
@@ -364,6 +365,7 @@ def findings_of(folder: Path, configuration: Configuration, out: Path) -> dict[s
     return {finding.code: f"{finding.severity}: {finding.text}" for finding in found.findings}
 
 
+@pytest.mark.slow
 def test_bad_ranges_and_a_station_in_the_wrong_place(
     copied: Path, configuration: Configuration, tmp_path: Path
 ) -> None:
@@ -397,6 +399,7 @@ def test_a_clock_a_week_off(copied: Path, configuration: Configuration, tmp_path
     assert (tmp_path / "out" / IDENTITY).is_dir()
 
 
+@pytest.mark.slow
 def test_a_clock_that_leaps_and_an_aircraft_that_is_there_twice(
     copied: Path, configuration: Configuration, tmp_path: Path
 ) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import nbformat
+import pytest
 from nbclient import NotebookClient
 
 TUTORIAL = Path(__file__).parents[1] / "docs" / "notebooks" / "tutorial.ipynb"
@@ -75,6 +76,7 @@ def expect_the_recording_is_a_widget(executed: Any) -> None:
     assert "application/vnd.jupyter.widget-view+json" in outputs_of(executed, "flight.show(")
 
 
+@pytest.mark.slow
 def test_every_cell_runs_and_shows_what_its_text_tells(tmp_path: Path) -> None:
     executed = executed_in(tmp_path)  # once: each worker of a run in parallel would run it again for its own test
     expect_nothing_goes_to_stderr(executed)

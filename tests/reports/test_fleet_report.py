@@ -250,6 +250,7 @@ def test_nothing_from_a_log_is_markup(tmp_path: Path) -> None:
     assert "alert(1)" in paper
 
 
+@pytest.mark.slow
 def test_the_same_fleet_gives_the_same_bytes_wherever_it_is_made(tmp_path: Path) -> None:
     fleet = fleet_of(12, samples=50, not_in_fleet=MISSING)
     first = [path.read_bytes() for path in write_fleet_report(tmp_path, fleet, systems(), with_pdf=True).paths]

@@ -287,6 +287,7 @@ def test_a_template_that_cannot_be_set_is_told(tmp_path: Path, monkeypatch: pyte
         write_pdf(document(), tmp_path / PDF)
 
 
+@pytest.mark.slow
 def test_a_report_makes_the_pdf_of_the_run_again_and_one_line_says_why_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

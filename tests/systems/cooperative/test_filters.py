@@ -396,6 +396,7 @@ def test_dropping_a_third_of_the_ranges_leaves_the_filter_honest() -> None:
     check_nees(thinned, believed(thinned), "centralised", 7)
 
 
+@pytest.mark.slow
 def test_coming_and_going() -> None:
     guests = (
         replace(LOCAL.aircraft[0], leaves_s=30.0),
@@ -457,6 +458,7 @@ def test_latency_delays_what_neighbours_know() -> None:
     assert np.abs(positions[1] - positions[0]).max() > 1e-6 and np.abs(positions[2] - positions[1]).max() > 1e-6
 
 
+@pytest.mark.slow
 def test_a_lone_net_of_exact_neighbours_feeds_its_errors_and_two_points_stop_it() -> None:
     radii = {}
     for name, points in (("alone", ()), ("two points", LOCAL.points)):

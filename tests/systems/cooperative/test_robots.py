@@ -145,6 +145,7 @@ def test_equal_ranks_tell_one_another_nothing() -> None:
     assert run_algorithm(prepare(team.session(), BELIEF), BELIEF, "ranked").messages["R1"][0] > 50
 
 
+@pytest.mark.slow
 def test_honesty_of_filters_that_keep_correlations() -> None:
     """NEES of R2 over all seeds: near 2 for the centralised filter, not above it for covariance intersection."""
     teams = [Team(np.random.default_rng(seed)) for seed in SEEDS]

@@ -131,6 +131,7 @@ def test_factor_nodes_have_mean_and_sigma_of_the_class() -> None:
         assert (nodes > 0.0).all()
 
 
+@pytest.mark.slow
 def test_grid_and_histories_are_fine_enough() -> None:
     """Against four times the values and histories the half widths differ by less than half an arcminute."""
     fine = InstallationSettings(hypotheses=200, nodes=61, factor_sigmas=5.0)

@@ -102,6 +102,7 @@ def test_arm_inside_the_gates() -> None:
     assert arm_table()["largest_deg"] == pytest.approx([0.33, 0.83, 1.67], abs=0.01)
 
 
+@pytest.mark.slow
 def test_study_writes_its_tables_and_page() -> None:
     lines: list[str] = []
     study = study_heading(runs=2, seed=FEW_SEED, progress=lines.append)

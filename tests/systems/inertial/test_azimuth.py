@@ -276,6 +276,7 @@ def early_errors(runs: int, seed: int, initial_azimuth_deg: float, duration_s: f
     return np.array(out)
 
 
+@pytest.mark.slow
 def test_azimuth_on_taxi_of_an_ins_a_degree_off_is_not_taken_from_hours_later() -> None:
     """An azimuth error of a degree oscillates: a straight line through 2.5 h missed it by 1.8 sigma rms."""
     errors = early_errors(12, 77, 1.0, 9000.0)

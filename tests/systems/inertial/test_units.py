@@ -78,6 +78,7 @@ def test_steps_have_their_size_inside_their_interval() -> None:
         assert fault.value is not None and fault.value == pytest.approx(metres, abs=0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("late_s", "ppm"), [(5.0, 0.0), (-0.5, 0.0), (0.0, 300.0)])
 def test_clocks_that_differ_are_told_and_taken_off(late_s: float, ppm: float) -> None:
     def change(one: UnitTrack) -> UnitTrack:

@@ -266,6 +266,7 @@ def test_a_beacon_of_a_runway_that_is_not_there_is_refused() -> None:
         SiteData(runways=(Runway("06", 60.0),), beacons=(Beacon("outer", 4000.0, runway="24"),))
 
 
+@pytest.mark.slow
 def test_a_log_of_a_simulated_approach_from_file_to_summary(tmp_path: Path) -> None:
     log, site = simulate_to("approach-beacons", tmp_path / "log")
     configuration = load_configuration(site=site)

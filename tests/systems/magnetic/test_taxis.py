@@ -31,6 +31,7 @@ VERDICTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", range(len(CELLS)))
 def test_every_verdict_of_the_taxi_leads_to_a_table_within_its_sigma(run: int) -> None:
     outcome = taxi_outcome(CELLS[run], seed_of(SEED, run))

@@ -113,6 +113,7 @@ def test_the_gradient_with_the_separation_is_exact() -> None:
     assert_slopes_agree(one_step(at[:, 7])[1], differences(one_step, at[:, 7]))
 
 
+@pytest.mark.slow
 def test_laws_keep_the_separation_that_they_would_break_without_it() -> None:
     """A single source ahead: the nearer one passes it, the faster its direction turns."""
     ahead = PlannedAircraft("A", 3000.0, 400.0, 8000.0, 200.0, 0.0, is_exact=True)

@@ -67,6 +67,7 @@ def test_height_at_touchdown_follows_the_wander_of_the_barometer() -> None:
     assert up["3 m each 0.5 s"] > 3.0
 
 
+@pytest.mark.slow
 def test_trials_are_flown_in_processes_and_told_with_their_limits() -> None:
     scenario = replace(approach("moving-fourth"), noise=landing_cases.RangeNoise(interval_s=0.1))
     told: list[str] = []

@@ -130,6 +130,7 @@ def turned_log() -> Log:
     )
 
 
+@pytest.mark.slow
 def test_a_turned_world_turns_the_answer() -> None:
     one, other = track_of(plain()), track_of(solved(turned_log()))
     c, s = np.cos(np.radians(TURN_DEG)), np.sin(np.radians(TURN_DEG))
