@@ -42,6 +42,7 @@ from groundstation.tables.sources import TOGETHER
 
 LABELS = "bcdefghijklmnopqrstuvwxyz"  # labels of the logs behind the first, whose topics keep their names
 OF_FIELDS = ("derived.", f"{HEADING_IS_TRACK}.")  # keys about a field, <topic>.<field> behind them
+OF_AN_INS = ("ins_serial", "ins_kind")  # <topic> behind the key of every other INS
 OF_THE_AIRCRAFT = ("aircraft", "flight", "start_utc")  # taken from another log where the first lacks them
 
 
@@ -413,6 +414,9 @@ def _metadata(parts: Sequence[_Part], joining: str) -> dict[str, str]:
                 found[part.name(key)] = value
             else:
                 found[f"{part.label}.{key}"] = value
+            code, _, topic = key.partition(".")
+            if code in OF_AN_INS:
+                found[f"{code}.{part.name(topic or 'ins')}"] = value
         for key in OF_THE_AIRCRAFT:
             found.setdefault(key, part.converted.info.metadata.get(key, ""))
     return {key: value for key, value in {**found, TOGETHER: joining}.items() if value}

@@ -67,6 +67,7 @@ def _claim(answer: UnitsResult) -> Claim:
         ", ".join(answer.off),
         f"of {len(answer.units)} INS",
         (f"{typeset(answer.sentence)}.",),
+        is_danger=answer.verdict == "off",
     )
 
 

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ import pytest
 from groundstation.chapters.parts import Mark
 from groundstation.pipeline.one_flight.analyse import known_of, run_analyses, seen_by_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.join import _metadata
 from groundstation.pipeline.verbs.acceptance import accept
 from groundstation.pipeline.verbs.usable import usability_of_flight
 from groundstation.results.answer import by_analysis
@@ -20,6 +23,7 @@ from groundstation.systems.inertial.units_answer import UnitsResult
 from groundstation.systems.inertial.units_arrays import UnitsErrors
 from groundstation.systems.inertial.units_chapter import units as chapter
 from groundstation.systems.inertial.units_plots import errors, pairs, radial
+from groundstation.systems.joining import name_in_flight
 from groundstation.tables.table import Flight
 from tests.acceptance_example import save_flight
 from tests.report_example import MANIFEST, example
@@ -145,3 +149,22 @@ def test_acceptance_counts_every_unit_of_a_flight(tmp_path: Path) -> None:
     expected = answer.unit("ins.1").rate_fit_nmiph
     assert expected is not None and rate == pytest.approx(expected.value, rel=0.02)
     assert answer.figures[0].name == UnitsErrors.figure
+
+
+def test_the_serial_of_each_log_stays_with_its_unit_when_logs_are_joined() -> None:
+    def part(label: str, metadata: dict[str, str]) -> Any:
+        info = SimpleNamespace(metadata=metadata)
+        return SimpleNamespace(
+            label=label, converted=SimpleNamespace(info=info), name=lambda topic: name_in_flight(topic, label)
+        )
+
+    logs = [part("a", {"ins_serial": "A1"}), part("b", {"ins_serial": "B2", "ins_kind": "unaided"})]
+    found = _metadata([*logs, part("c", {"ins_serial": "C3", "ins_serial.ins.1": "C4"})], "joined")
+    told = {key: value for key, value in found.items() if key.startswith("ins_")}
+    assert told == {
+        "ins_serial": "A1",
+        f"ins_serial.{name_in_flight('ins', 'b')}": "B2",
+        f"ins_kind.{name_in_flight('ins', 'b')}": "unaided",
+        f"ins_serial.{name_in_flight('ins', 'c')}": "C3",
+        f"ins_serial.{name_in_flight('ins.1', 'c')}": "C4",
+    }
