@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from groundstation.readers import imu, registry
-from groundstation.readers.ulog.canonical import IMU_ROLES, TopicRows
+from groundstation.readers.ulog.canonical import TopicRows
+from groundstation.readers.ulog.inertial import IMU_ROLES
 from tests.readers import test_bags as bags
 from tests.readers.bag_writer import START_NS, Messages, write_ros1
 from tests.readers.dataflash_writer import DataFlash

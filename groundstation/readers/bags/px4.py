@@ -9,7 +9,8 @@ from typing import Any
 
 from groundstation.base.records import Remark
 from groundstation.readers.mapping import OfferedMessages, assigned
-from groundstation.readers.ulog.canonical import IMU_ROLES, ROLES
+from groundstation.readers.ulog.canonical import ROLES
+from groundstation.readers.ulog.inertial import IMU_ROLES
 
 _PACKAGE = "px4_msgs/"
 _UPPER = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import Column
 from groundstation.base.units import DEG_PER_RAD, NT_PER_GAUSS
-from groundstation.readers import imu
 from groundstation.readers.mapping import (
     Columns,
     NumericColumns,
@@ -31,10 +30,9 @@ _DOWNWARD = 25  # distance_sensor.orientation: ROTATION_DOWNWARD_FACING
 _2D_FIX, FIX_3D, _EXTRAPOLATED = 2, 3, 8
 # sensor_gps.fix_type: 0 and 1 no fix, 4 corrected code, 8 extrapolated; 7 is not used.
 _FIXES = np.array(["none", "none", "2d", "3d", "dgnss", "rtk_float", "rtk_fixed", "other", "dead_reckoning", "other"])
-_INVALID = 0x7FFFFFFF  # sensor_combined.<sensor>_timestamp_relative of a sensor that is not there
+NOT_THERE = 0x7FFFFFFF  # sensor_combined.<sensor>_timestamp_relative of a sensor that is not there
 _HPA_BELOW = 1_200.0  # sensor_baro.pressure is in hPa before PX4 1.13, in Pa from then on
 _UNKNOWN_CURRENT = -1.0
-_S_PER_US = 1e-6
 SAMPLED = "timestamp_sample"  # when the values were true, microseconds; 0 where a driver does not tell
 
 
@@ -56,7 +54,7 @@ class TopicRows:
             return np.asarray(self._rows[name].astype(np.float64))
 
 
-def _vector(fields: tuple[str, str, str], name: str, factor: float) -> Callable[[NumericColumns], Columns]:
+def vector_of(fields: tuple[str, str, str], name: str, factor: float) -> Callable[[NumericColumns], Columns]:
     return scaled({field: (f"{name}[{axis}]", factor) for axis, field in enumerate(fields)})
 
 
@@ -142,54 +140,6 @@ def _filled(ellipsoid: Column, msl: Column) -> Column:
     return Column(ellipsoid.values, ellipsoid.mask & ((ellipsoid.values != 0.0) | (msl.values == 0.0)))
 
 
-def vehicle_imu(rows: NumericColumns) -> Columns:
-    """Return the increments of one unit, and how many axes were clipped.
-
-    Its intervals are in microseconds.
-    """
-    angles, velocities = ([rows[f"{name}[{k}]"] for k in range(3)] for name in ("delta_angle", "delta_velocity"))
-    if "dt" in rows:  # betas of PX4 1.11
-        columns = imu.increments(angles, velocities, rows["dt"] * _S_PER_US)
-    else:
-        intervals = (rows[f"{name}_dt"] * _S_PER_US for name in ("delta_angle", "delta_velocity"))
-        columns = imu.increments(angles, velocities, *intervals)
-    return columns | _clipping(rows, ("delta_angle_clipping",), ("delta_velocity_clipping", "clipping"))
-
-
-def sensor_combined(rows: NumericColumns) -> Columns:
-    """Return the increments of the sensors in use.
-
-    They are mean rates and specific forces times their own integration times.
-    """
-    gyro_s, accelerometer_s = (_integration_s(rows[f"{name}_integral_dt"]) for name in ("gyro", "accelerometer"))
-    mark = "accelerometer_timestamp_relative"
-    angles = [rows[f"gyro_rad[{k}]"] * gyro_s for k in range(3)]
-    velocities = [rows[f"accelerometer_m_s2[{k}]"] * accelerometer_s for k in range(3)]
-    is_there = rows[mark] != _INVALID if mark in rows else None
-    columns = imu.increments(angles, velocities, gyro_s, accelerometer_s, has_velocity=is_there)
-    return columns | _clipping(rows, ("gyro_clipping",), ("accelerometer_clipping",))
-
-
-def _integration_s(times: FloatArray) -> FloatArray:
-    """Return integration times in seconds; from PX4 1.6 on they are logged in microseconds."""
-    with np.errstate(invalid="ignore"):
-        return np.where(times < 1.0, times, times * _S_PER_US)
-
-
-def _clipping(rows: NumericColumns, *sources: tuple[str, ...]) -> Columns:
-    found: Columns = {}
-    for field, names in zip(("gyro_clipping", "accel_clipping"), sources, strict=True):
-        logged = next((name for name in names if name in rows), None)
-        if logged is not None:
-            found[field] = imu.bits(rows[logged])
-    return found
-
-
-def _imu_samples(fields: tuple[str, ...], factor: float) -> Callable[[NumericColumns], Columns]:
-    plain = _vector(fields, "xyz", factor)  # type: ignore[arg-type]
-    return lambda rows: imu.samples(plain(rows))
-
-
 _GNSS_FIELDS: Mapping[str, tuple[tuple[str, float], ...]] = {
     "latitude_deg": (("latitude_deg", 1.0), ("lat", 1e-7)),
     "longitude_deg": (("longitude_deg", 1.0), ("lon", 1e-7)),
@@ -260,7 +210,7 @@ _GNSS_NEEDS = ("fix_type",)
 def _vector_rule(
     source: str, name: str, fields: tuple[str, str, str], factor: float = 1.0, **derived: str
 ) -> SourceRule:
-    return SourceRule(source, tuple(f"{name}[{axis}]" for axis in range(3)), _vector(fields, name, factor), derived)
+    return SourceRule(source, tuple(f"{name}[{axis}]" for axis in range(3)), vector_of(fields, name, factor), derived)
 
 
 def _while_there(sensor: str, rule: SourceRule) -> SourceRule:
@@ -274,7 +224,7 @@ def _while_there(sensor: str, rule: SourceRule) -> SourceRule:
         found = rule.columns(rows)
         if mark not in rows:
             return found
-        is_there = rows[mark] != _INVALID
+        is_there = rows[mark] != NOT_THERE
         return {field: Column(column.values, column.mask & is_there) for field, column in found.items()}
 
     return SourceRule(rule.source, rule.needs, columns, rule.derived)
@@ -370,59 +320,6 @@ ROLES: tuple[Role, ...] = (
                 {"weight_on_wheels": "landed flag of the autopilot (vehicle_land_detected)"},
             ),
         ),
-    ),
-)
-_THREE = range(3)
-_VEHICLE_IMU = (
-    *(f"delta_angle[{k}]" for k in _THREE),
-    *(f"delta_velocity[{k}]" for k in _THREE),
-)
-_INTERVALS = (("delta_angle_dt", "delta_velocity_dt"), ("dt",))
-_COMBINED = (
-    *(f"gyro_rad[{k}]" for k in _THREE),
-    *(f"accelerometer_m_s2[{k}]" for k in _THREE),
-    *("gyro_integral_dt", "accelerometer_integral_dt"),
-)
-_XYZ = tuple(f"xyz[{k}]" for k in _THREE)
-_COMBINED_TEXT = "mean rate and specific force of sensor_combined, times their own integration times"
-# Sources of `imu`, best first: the roles of each. Which has enough of the records is told by their counts.
-IMU_ROLES: tuple[tuple[Role, ...], ...] = (
-    (
-        Role(
-            "imu",
-            tuple(
-                SourceRule("vehicle_imu", (*_VEHICLE_IMU, *needed), vehicle_imu, sampled=SAMPLED)
-                for needed in _INTERVALS
-            ),
-            has_instances=True,
-        ),
-    ),
-    (
-        Role(
-            "imu",
-            (
-                SourceRule(
-                    "sensor_combined",
-                    _COMBINED,
-                    sensor_combined,
-                    dict.fromkeys((*imu.ANGLES, *imu.VELOCITIES), _COMBINED_TEXT),
-                ),
-            ),
-        ),
-    ),
-    tuple(
-        Role(
-            "imu",
-            (
-                SourceRule(
-                    source, _XYZ, _imu_samples(fields, factor), dict.fromkeys(fields, imu.POINT_SAMPLES), SAMPLED
-                ),
-            ),
-        )
-        for source, fields, factor in (
-            ("vehicle_angular_velocity", imu.RATES, DEG_PER_RAD),
-            ("vehicle_acceleration", imu.ACCELERATIONS, 1.0),
-        )
     ),
 )
 MODES = ("vehicle_status", "nav_state")

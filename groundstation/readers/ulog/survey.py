@@ -13,7 +13,8 @@ from groundstation.base.records import Remark
 from groundstation.readers.imu import first_whole
 from groundstation.readers.mapping import Assignment, OfferedMessages, Role, assigned
 from groundstation.readers.ulog.blocks import Definitions, Topic, UlogBlock
-from groundstation.readers.ulog.canonical import ARMING, IMU_ROLES, ROLES
+from groundstation.readers.ulog.canonical import ARMING, ROLES
+from groundstation.readers.ulog.inertial import IMU_ROLES
 from groundstation.readers.ulog.messages import Keyed, keyed, release_text
 from groundstation.readers.ulog.utc import FIX_3D, UtcCollector
 
