@@ -10,7 +10,7 @@ from groundstation.base.errors import UsageError
 from groundstation.base.toml_settings import settings_from
 from groundstation.cli.main import main
 from groundstation.pipeline.verbs.catalogue import catalogue
-from groundstation.pipeline.verbs.synthesis import is_session, simulate_to
+from groundstation.pipeline.verbs.synthesis import kind_of, simulate_to
 from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_log import write_session
 from groundstation.simulation.session_scenario import SessionScenario, load_session, session_names
@@ -93,8 +93,8 @@ def test_the_same_bytes_every_time(written: tuple[SessionScenario, Path], tmp_pa
 def test_simulate_takes_sessions_by_name_and_by_file(tmp_path: Path) -> None:
     file = tmp_path / "Two.toml"
     file.write_text(TOML)
-    assert is_session(str(file))
-    assert not is_session("taxi-good")
+    assert kind_of(str(file)) == "session"
+    assert kind_of("taxi-good") == "flight"
     with pytest.raises(SystemExit) as ended:
         main(["simulate", str(file), "-o", str(tmp_path / "logs"), "-q"])
     assert ended.value.code == 0

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from groundstation.base.errors import SettingsError, UsageError
-from groundstation.pipeline.verbs.synthesis import is_units_fleet, simulate_to
+from groundstation.pipeline.verbs.synthesis import kind_of, simulate_to
 from groundstation.simulation.ins_units.fleet import FlownPeriod, load_units_fleet, units_fleet_names
 from groundstation.simulation.ins_units.settings import UnitAided, UnitDrift
 
@@ -23,7 +23,7 @@ every_days = 40.0
 @pytest.mark.parametrize("name", units_fleet_names())
 def test_shipped_fleets_have_distinct_logs(name: str) -> None:
     names = [one.log_name for one in load_units_fleet(name).scenarios()]
-    assert len(set(names)) == len(names) > 1 and is_units_fleet(name) and not is_units_fleet("units-two")
+    assert len(set(names)) == len(names) > 1 and kind_of(name) == "fleet" and kind_of("units-two") == "units"
 
 
 def test_a_log_for_each_flight_with_its_date_and_its_serials(tmp_path: Path) -> None:

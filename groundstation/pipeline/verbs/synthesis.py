@@ -4,7 +4,7 @@ The runs of a study are kept in its folder, so that a stopped study continues.
 """
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -25,6 +25,7 @@ R = TypeVar("R")
 
 
 Form = Literal["csv", "ch10", "ulog", "dataflash", "ros1"]
+Kind = Literal["imu", "fleet", "session", "approach", "units", "flight"]  # of a scenario
 SUFFIXES: Mapping[Form, str] = MappingProxyType({"csv": "csv", "ulog": "ulg", "dataflash": "BIN", "ros1": "bag"})
 
 
@@ -51,26 +52,18 @@ def simulate_to(
     from groundstation.simulation.samples import write_log
     from groundstation.simulation.scenario import load_scenario
 
-    if is_imu(scenario):
+    kind = kind_of(scenario)
+    if kind == "imu":
         return _imu_to(scenario, folder, seed, form, force=force)
     if form not in {"csv", "ch10"}:
         raise UsageError(scenario, f"--format {form}", "csv or ch10, or a scenario of an inertial unit (imu-uav)")
-    if is_units_fleet(scenario):
+    if kind != "flight":
         if form != "csv":
             raise UsageError(scenario, f"--format {form}", "a scenario of one flight")
-        return _units_fleet_to(scenario, folder, seed, force=force)
-    if form != "csv" and (is_session(scenario) or is_approach(scenario) or has_units(scenario)):
-        raise UsageError(scenario, f"--format {form}", "a scenario of one flight")
-    if is_session(scenario):
-        return _session_to(scenario, folder, seed, force=force)
-    if is_approach(scenario):
-        return [_approach_to(scenario, folder, seed, force=force)]
-    if has_units(scenario):
-        return [_units_to(scenario, folder, seed, force=force)]
+        return _WRITERS[kind](scenario, folder, seed, force=force)
     loaded = load_scenario(scenario)
     target = folder / f"{loaded.name}.{form}"
-    if target.exists() and not force:
-        raise UsageError(str(target), "a file that exists", "a new folder", "-f overwrites it")
+    _require_free([target], force=force)
     simulated = simulate(loaded, seed)
     site = site_of(simulated.trajectory, loaded)
     if form == "csv":
@@ -85,70 +78,52 @@ def simulate_to(
     return paths
 
 
-def is_session(scenario: str) -> bool:
-    """Tell whether a scenario has several aircraft.
+def kind_of(scenario: str) -> Kind:
+    """Return the kind of a scenario: that of a shipped name, or what a TOML file says by its tables.
 
-    A shipped name of such, or a TOML file with ``[[aircraft]]``.
-    """
-    from groundstation.simulation.session_scenario import session_names
+    Raises
+    ------
+    UsageError
+        For a file that is no TOML.
 
-    if not scenario.endswith(".toml"):
-        return scenario.lower() in session_names()
-    path = Path(scenario)
-    return path.is_file() and isinstance(read_toml(path).get("aircraft"), list)
-
-
-def is_approach(scenario: str) -> bool:
-    """Tell whether a scenario is an approach on an ILS.
-
-    A shipped name of such, or a TOML file with ``[recorded]``.
+    Examples
+    --------
+    >>> kind_of("imu-uav"), kind_of("taxi-good")
+    ('imu', 'flight')
     """
     from groundstation.simulation.approach import approach_names
-
-    if not scenario.endswith(".toml"):
-        return scenario.lower() in approach_names()
-    path = Path(scenario)
-    return path.is_file() and isinstance(read_toml(path).get("recorded"), dict)
-
-
-def is_imu(scenario: str) -> bool:
-    """Tell whether a scenario is a log of an inertial unit.
-
-    A shipped name of such, or a TOML file with a ``family``.
-    """
     from groundstation.simulation.imu.scenario import imu_scenario_names
-
-    if not scenario.endswith(".toml"):
-        return scenario.lower() in imu_scenario_names()
-    path = Path(scenario)
-    return path.is_file() and "family" in read_toml(path)
-
-
-def has_units(scenario: str) -> bool:
-    """Tell whether a scenario is a flight with several INS units.
-
-    A shipped name of such, or a TOML file with ``[flown]`` that has ``units``.
-    """
-    from groundstation.simulation.ins_units.scenario import units_scenario_names
-
-    if not scenario.endswith(".toml"):
-        return scenario.lower() in units_scenario_names()
-    path = Path(scenario)
-    flown = read_toml(path).get("flown") if path.is_file() else None
-    return isinstance(flown, dict) and "units" in flown
-
-
-def is_units_fleet(scenario: str) -> bool:
-    """Tell whether a scenario is a fleet whose INS are followed over months.
-
-    A shipped name of such, or a TOML file with ``[[flown]]``.
-    """
     from groundstation.simulation.ins_units.fleet import units_fleet_names
+    from groundstation.simulation.ins_units.scenario import units_scenario_names
+    from groundstation.simulation.session_scenario import session_names
 
+    shipped: Mapping[Kind, Callable[[], tuple[str, ...]]] = {
+        "imu": imu_scenario_names,
+        "fleet": units_fleet_names,
+        "session": session_names,
+        "approach": approach_names,
+        "units": units_scenario_names,
+    }
     if not scenario.endswith(".toml"):
-        return scenario.lower() in units_fleet_names()
+        return next((kind for kind, names in shipped.items() if scenario.lower() in names()), "flight")
     path = Path(scenario)
-    return path.is_file() and isinstance(read_toml(path).get("flown"), list)
+    table = read_toml(path) if path.is_file() else {}
+    flown = table.get("flown")
+    told: Mapping[Kind, bool] = {
+        "imu": "family" in table,
+        "fleet": isinstance(flown, list),
+        "session": isinstance(table.get("aircraft"), list),
+        "approach": isinstance(table.get("recorded"), dict),
+        "units": isinstance(flown, dict) and "units" in flown,
+    }
+    return next((kind for kind, is_so in told.items() if is_so), "flight")
+
+
+def _require_free(paths: Iterable[Path], *, force: bool) -> None:
+    """Refuse to write over a log that is there, unless forced to."""
+    there = next((path for path in paths if path.exists()), None)
+    if there is not None and not force:
+        raise UsageError(str(there), "a file that exists", "a new folder", "-f overwrites it")
 
 
 def _imu_to(name: str, folder: Path, seed: int | None, form: Form, *, force: bool) -> list[Path]:
@@ -165,9 +140,7 @@ def _imu_to(name: str, folder: Path, seed: int | None, form: Form, *, force: boo
     paths = [folder / f"{scenario.name}.{SUFFIXES[form]}"]
     if form != "csv" and scenario.truth_rate_hz > 0.0:
         paths.append(folder / f"{scenario.name}.truth.csv")
-    there = [path for path in paths if path.exists()]
-    if there and not force:
-        raise UsageError(str(there[0]), "a file that exists", "a new folder", "-f overwrites it")
+    _require_free(paths, force=force)
     folder.mkdir(parents=True, exist_ok=True)
     flight = fly(scenario, seed)
     for path, write in zip(paths, (writers[form], write_truth), strict=False):
@@ -175,34 +148,28 @@ def _imu_to(name: str, folder: Path, seed: int | None, form: Form, *, force: boo
     return paths
 
 
-def _approach_to(name: str, folder: Path, seed: int | None, *, force: bool) -> Path:
+def _approach_to(name: str, folder: Path, seed: int | None, *, force: bool) -> list[Path]:
     from groundstation.simulation.approach import load_approach, write_approach
 
     scenario = load_approach(name)
-    target = folder / f"{scenario.name}.csv"
-    if target.exists() and not force:
-        raise UsageError(str(target), "a file that exists", "a new folder", "-f overwrites it")
-    return write_approach(scenario, folder, seed)
+    _require_free([folder / f"{scenario.name}.csv"], force=force)
+    return [write_approach(scenario, folder, seed)]
 
 
-def _units_to(name: str, folder: Path, seed: int | None, *, force: bool) -> Path:
+def _units_to(name: str, folder: Path, seed: int | None, *, force: bool) -> list[Path]:
     from groundstation.simulation.ins_units.log import write_units
     from groundstation.simulation.ins_units.scenario import load_units_scenario
 
     scenario = load_units_scenario(name)
-    target = folder / scenario.log_name
-    if target.exists() and not force:
-        raise UsageError(str(target), "a file that exists", "a new folder", "-f overwrites it")
-    return write_units(scenario, folder, seed)
+    _require_free([folder / scenario.log_name], force=force)
+    return [write_units(scenario, folder, seed)]
 
 
 def _units_fleet_to(name: str, folder: Path, seed: int | None, *, force: bool) -> list[Path]:
     from groundstation.simulation.ins_units.fleet import load_units_fleet, write_units_fleet
 
     fleet = load_units_fleet(name)
-    there = [folder / one.log_name for one in fleet.scenarios() if (folder / one.log_name).exists()]
-    if there and not force:
-        raise UsageError(str(there[0]), "a file that exists", "a new folder", "-f overwrites it")
+    _require_free((folder / one.log_name for one in fleet.scenarios()), force=force)
     return write_units_fleet(fleet, folder, seed)
 
 
@@ -211,10 +178,11 @@ def _session_to(name: str, folder: Path, seed: int | None, *, force: bool) -> li
     from groundstation.simulation.session_scenario import load_session
 
     scenario, stem = load_session(name), Path(name).stem.lower()
-    there = [path for path in session_paths(scenario, folder, stem) if path.exists()]
-    if there and not force:
-        raise UsageError(str(there[0]), "a file that exists", "a new folder", "-f overwrites it")
+    _require_free(session_paths(scenario, folder, stem), force=force)
     return write_session(scenario, folder, stem, seed)
+
+
+_WRITERS = {"fleet": _units_fleet_to, "session": _session_to, "approach": _approach_to, "units": _units_to}
 
 
 def study_to(
@@ -280,8 +248,6 @@ def _resumed(
 ) -> "Callable[..., StudyResult]":
     """Return the study with its runs, of type ``outcome``, kept in a folder."""
     from shutil import rmtree
-
-    from groundstation.pipeline.verbs.synthesis import KeptRuns
 
     if afresh and folder.is_dir():
         rmtree(folder)
