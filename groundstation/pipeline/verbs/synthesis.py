@@ -79,7 +79,7 @@ def simulate_to(
 
 
 def kind_of(scenario: str) -> Kind:
-    """Return the kind of a scenario: that of a shipped name, or what a TOML file says by its tables.
+    """Return the kind of a scenario: of a shipped name, or by the tables of a TOML file.
 
     Raises
     ------
