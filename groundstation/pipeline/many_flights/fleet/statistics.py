@@ -219,7 +219,7 @@ def _units(found: Scan, flights: FigureData, shares: Any) -> UnitHistories:
         for row, own in enumerate(every)
         for unit in own
     ]
-    return histories_of(flown, limits_in(found.out))
+    return histories_of(flown, limits_in(found.out)[0])
 
 
 def _details(found: Scan, flights: FigureData, shares: Any) -> tuple[SkillMerger, FleetSkillFlights, FleetChecks]:

@@ -34,27 +34,18 @@ def keep_limits(out: Path, path: Path) -> UnitLimits:
     return found
 
 
-def limits_in(out: Path) -> UnitLimits:
-    """Return the limits of a folder; the shipped ones without a file that can be used."""
+def limits_in(out: Path) -> tuple[UnitLimits, str]:
+    """Return the limits of a folder, and what is wrong with its file in a line.
+
+    The shipped ones without a file that can be used; the line is empty where nothing is wrong.
+    """
     path = out / UNIT_LIMITS
     if not path.is_file():
-        return UnitLimits()
+        return UnitLimits(), ""
     try:
-        return settings_from(UnitLimits, read_toml(path), str(path))
-    except GroundstationError:  # it is told of where the tables are written
-        return UnitLimits()
-
-
-def _problem_of_limits(out: Path) -> str:
-    """Return what is wrong with the limits of a folder, in a line; empty where nothing is."""
-    path = out / UNIT_LIMITS
-    if not path.is_file():
-        return ""
-    try:
-        settings_from(UnitLimits, read_toml(path), str(path))
+        return settings_from(UnitLimits, read_toml(path), str(path)), ""
     except GroundstationError as error:
-        return str(error)
-    return ""
+        return UnitLimits(), str(error)
 
 
 def write_units(out: Path, fleet: FleetResults) -> tuple[Outcome, ...]:
@@ -63,7 +54,7 @@ def write_units(out: Path, fleet: FleetResults) -> tuple[Outcome, ...]:
     Returns what could not be written, and what is wrong with the limits.
     """
     problems = []
-    if told := _problem_of_limits(out):
+    if told := limits_in(out)[1]:
         problems.append(Outcome(str(out / UNIT_LIMITS), "failed", told, is_beside=True))
     tables = {UNITS_CSV: units_table(fleet.units), UNIT_FLIGHTS_CSV: flights_table(fleet.unit_flights)}
     for name, table in tables.items():
