@@ -199,3 +199,26 @@ def latitude_longitude_deg(
     mid_latitude_rad = np.deg2rad(0.5 * (latitude + origin_latitude_deg))
     difference_deg = np.rad2deg(np.asarray(east_m, dtype=np.float64) / (prime_vertical * np.cos(mid_latitude_rad)))
     return latitude, wrap_180(origin_longitude_deg + difference_deg)
+
+
+def displaced_deg(
+    latitude_deg: FloatArray, longitude_deg: FloatArray, altitude_m: FloatArray, moved_m: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return latitude and longitude, degrees, of places moved on the tangent plane of each.
+
+    Parameters
+    ----------
+    latitude_deg, longitude_deg, altitude_m : ndarray, shape (n,)
+    moved_m : ndarray, shape (n, 2)
+        North and east, metres.
+
+    Examples
+    --------
+    >>> latitude, longitude = displaced_deg(*np.array([[56.0], [179.99], [0.0]]), np.array([[0.0, 1000.0]]))
+    >>> round(float(latitude[0]), 4), round(float(longitude[0]), 4)
+    (56.0, -179.994)
+    """
+    meridian, prime_vertical = curvature_radii_m(latitude_deg)
+    parallel = (prime_vertical + altitude_m) * np.cos(np.deg2rad(latitude_deg))
+    latitude = latitude_deg + np.rad2deg(moved_m[:, 0] / (meridian + altitude_m))
+    return np.asarray(latitude), np.asarray(wrap_180(longitude_deg + np.rad2deg(moved_m[:, 1] / parallel)))

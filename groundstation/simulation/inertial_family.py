@@ -41,6 +41,16 @@ class GnssErrorModel:
         check_ranges(self)
 
 
+ORDINARY_RECEIVER = GnssErrorModel(
+    position_white_m=2.0,
+    position_correlated_m=3.0,
+    position_correlation_s=300.0,
+    velocity_white_mps=0.03,
+    velocity_correlated_mps=0.02,
+    velocity_correlation_s=60.0,
+)  # docs/forecast-family.md
+
+
 @dataclass(frozen=True)
 class FamilySettings:
     """A family of flights.
@@ -190,7 +200,7 @@ def _one_run(family: FamilySettings, time_s: FloatArray, seed: int, run: int) ->
     if errors is None:
         errors = _full_errors(family, ins, route, streams)
         wander = draw_heading_wander(streams("heading"), time_s, motion.heading_deg[0], ins.heading)
-    position, velocity = _gnss_errors(family.gnss, len(time_s), family.step_s, streams("gnss"))
+    position, velocity = draw_gnss_errors(family.gnss, len(time_s), family.step_s, streams("gnss"))
     return {
         "latitude_deg": motion.latitude_deg[0],
         "longitude_deg": route.longitude_deg,
@@ -241,10 +251,10 @@ def _channel_errors(family: FamilySettings, ins: InsClass, time_s: FloatArray, s
     )
 
 
-def _gnss_errors(
+def draw_gnss_errors(
     noise: GnssErrorModel, n: int, step_s: float, rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
-    """Position and velocity errors, shapes (n, 2)."""
+    """Return position and velocity errors, north and east, shapes (n, 2)."""
     white = rng.standard_normal((4, n))
     position = noise.position_white_m * white[:2]
     velocity = noise.velocity_white_mps * white[2:]

@@ -12,19 +12,19 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.angles import FloatArray, wrap_180, wrap_360
+from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.base.errors import SettingsError
-from groundstation.base.geodesy import curvature_radii_m
+from groundstation.base.geodesy import displaced_deg
 from groundstation.base.records import Column, frozen
 from groundstation.base.toml_settings import check_ranges, number
 from groundstation.base.units import NS_PER_S
-from groundstation.simulation.inertial_family import GnssErrorModel
+from groundstation.simulation.inertial_family import GnssErrorModel, draw_gnss_errors
 from groundstation.simulation.ins_class import InsClass, load_ins_class
 from groundstation.simulation.ins_draw import DPH, MICRO_G, Streams, draw_heading_wander, draw_sensor_errors
 from groundstation.simulation.ins_errors import SensorErrors, propagate
 from groundstation.simulation.ins_units.settings import UnitOutput
 from groundstation.simulation.processes import gauss_markov
-from groundstation.simulation.readings import quantised, quantised_heading
+from groundstation.simulation.readings import in_steps, quantised_heading
 from groundstation.simulation.routes import Route, RouteKind, RoutePlan, draw_plan, fly_plan, smooth_ramp
 from groundstation.tables.table import Flight, Table
 
@@ -207,16 +207,6 @@ def _warming(
     return replace(sensors, gyro_radps=gyro, accelerometer_mps2=accelerometer)
 
 
-def _moved(
-    latitude_deg: FloatArray, longitude_deg: FloatArray, altitude_m: FloatArray, moved_m: FloatArray
-) -> FloatArray:
-    """Return places ``moved_m`` (north, east) away, shape (n, 2): latitude, longitude."""
-    meridian, prime_vertical = curvature_radii_m(latitude_deg)
-    parallel = (prime_vertical + altitude_m) * np.cos(np.deg2rad(latitude_deg))
-    latitude = latitude_deg + np.rad2deg(moved_m[:, 0] / (meridian + altitude_m))
-    return np.column_stack([latitude, wrap_180(longitude_deg + np.rad2deg(moved_m[:, 1] / parallel))])
-
-
 @dataclass(frozen=True)
 class _Path:
     """True motion of the whole log: the alignment in front."""
@@ -254,10 +244,10 @@ def _path(settings: ParkedSettings, route: Route, rng: np.random.Generator) -> _
         stands = np.hypot(*velocity.T) < 0.1
         velocity += stands[:, None] * gauss_markov(rng, (2, count), 1.0, settings.rocking_mps, ROCKING_S).T
     altitude = whole(motion.altitude_m[0], float(motion.altitude_m[0, 0]))
-    place = _moved(whole(latitude, float(latitude[0])), whole(longitude, float(longitude[0])), altitude, moved)
+    place = displaced_deg(whole(latitude, float(latitude[0])), whole(longitude, float(longitude[0])), altitude, moved)
     return _Path(
         np.arange(count, dtype=np.float64),
-        place,
+        np.column_stack(place),
         altitude,
         velocity,
         whole(motion.velocity_down_mps[0], 0.0),
@@ -278,16 +268,16 @@ def _log(
     ahead, rng = len(path.time_s) - len(position_m), streams("output")
     noise = rng.standard_normal((len(path.time_s), 3))
     wrong = np.concatenate([np.repeat(position_m[:1], ahead, axis=0), position_m])
-    place = _moved(path.place_deg[:, 0], path.place_deg[:, 1], path.altitude_m, wrong)
+    place = np.column_stack(displaced_deg(*path.place_deg.T, path.altitude_m, wrong))
     velocity = path.velocity_mps + np.concatenate([np.zeros((ahead, 2)), velocity_mps])
-    velocity = _rounded(velocity + output.velocity_noise_mps * noise[:, :2], output.velocity_step_mps)
+    velocity = in_steps(velocity + output.velocity_noise_mps * noise[:, :2], output.velocity_step_mps)
     velocity[:ahead] = 0.0
     place[:ahead] = place[ahead] if ahead else place[:ahead]
     turned = np.rad2deg(np.concatenate([np.zeros(ahead), heading_rad]))
     heading = wrap_360(path.heading_deg + turned + output.heading_noise_deg * noise[:, 2])
     ins: dict[str, NDArray[np.generic]] = {
-        "latitude_deg": _rounded(place[:, 0], output.position_step_deg),
-        "longitude_deg": _rounded(place[:, 1], output.position_step_deg),
+        "latitude_deg": in_steps(place[:, 0], output.position_step_deg),
+        "longitude_deg": in_steps(place[:, 1], output.position_step_deg),
         "altitude_ellipsoid_m": path.altitude_m,
         "velocity_north_mps": velocity[:, 0],
         "velocity_east_mps": velocity[:, 1],
@@ -308,25 +298,16 @@ def _log(
 
 
 def _gnss(settings: ParkedSettings, path: _Path, streams: Streams) -> dict[str, NDArray[np.generic]]:
-    model, rng, n = settings.gnss, streams("gnss"), len(path.time_s)
-    white = rng.standard_normal((4, n))
-    slow_m = gauss_markov(rng, (2, n), 1.0, model.position_correlated_m, model.position_correlation_s)
-    slow_mps = gauss_markov(rng, (2, n), 1.0, model.velocity_correlated_mps, model.velocity_correlation_s)
-    place = _moved(
-        path.place_deg[:, 0], path.place_deg[:, 1], path.altitude_m, (model.position_white_m * white[:2] + slow_m).T
-    )
-    velocity = path.velocity_mps + (model.velocity_white_mps * white[2:] + slow_mps).T
+    position, velocity = draw_gnss_errors(settings.gnss, len(path.time_s), 1.0, streams("gnss"))
+    latitude, longitude = displaced_deg(*path.place_deg.T, path.altitude_m, position)
+    velocity = path.velocity_mps + velocity
     return {
-        "latitude_deg": place[:, 0],
-        "longitude_deg": place[:, 1],
+        "latitude_deg": latitude,
+        "longitude_deg": longitude,
         "altitude_ellipsoid_m": path.altitude_m,
         "velocity_north_mps": velocity[:, 0],
         "velocity_east_mps": velocity[:, 1],
     }
-
-
-def _rounded(values: FloatArray, step: float) -> FloatArray:
-    return np.array(quantised(values, step) if step else values)
 
 
 def _table(topic: str, time_s: FloatArray, columns: dict[str, NDArray[np.generic]]) -> Table:

@@ -87,6 +87,11 @@ def quantised(values: FloatArray, resolution: float) -> FloatArray:
     return np.asarray(steps * resolution)
 
 
+def in_steps(values: FloatArray, resolution: float) -> FloatArray:
+    """Round to a multiple of the resolution; one of zero rounds nothing."""
+    return quantised(values, resolution) if resolution else np.asarray(values)
+
+
 def quantised_heading(heading_deg: FloatArray, resolution_deg: float) -> FloatArray:
     """Round headings and keep them in [0, 360): 359.9996 becomes 0, not 360.
 

@@ -11,9 +11,8 @@ from zlib import crc32
 
 import numpy as np
 
-from groundstation.simulation.inertial_family import GnssErrorModel
+from groundstation.simulation.inertial_family import ORDINARY_RECEIVER
 from groundstation.simulation.ins_units.settings import (
-    RECEIVER,
     AnyUnitFault,
     CommonErrors,
     GnssOutage,
@@ -206,15 +205,7 @@ def _late_but_the_first(flight: UnitsSettings) -> UnitsSettings:
 BROKEN: Mapping[str, Callable[[UnitsSettings], UnitsSettings]] = MappingProxyType(
     {
         "gnss_correlated": lambda flight: replace(
-            flight,
-            gnss=GnssErrorModel(
-                position_white_m=RECEIVER.position_white_m,
-                position_correlated_m=10.0,
-                position_correlation_s=300.0,
-                velocity_white_mps=RECEIVER.velocity_white_mps,
-                velocity_correlated_mps=RECEIVER.velocity_correlated_mps,
-                velocity_correlation_s=RECEIVER.velocity_correlation_s,
-            ),
+            flight, gnss=replace(ORDINARY_RECEIVER, position_correlated_m=10.0, position_correlation_s=300.0)
         ),
         "common_alignment": lambda flight: replace(flight, common=CommonErrors(tilt_times=2.0, azimuth_deg=0.1)),
         "anomalies": lambda flight: replace(flight, common=CommonErrors(deflection_arcsec=20.0, deflection_km=20.0)),

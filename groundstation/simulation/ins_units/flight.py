@@ -6,17 +6,17 @@ from zlib import crc32
 
 import numpy as np
 
-from groundstation.base.angles import FloatArray, wrap_180, wrap_360
-from groundstation.base.geodesy import curvature_radii_m
+from groundstation.base.angles import FloatArray, wrap_360
+from groundstation.base.geodesy import displaced_deg
 from groundstation.base.records import frozen
-from groundstation.simulation.inertial_family import GnssErrorModel
+from groundstation.simulation.inertial_family import draw_gnss_errors
 from groundstation.simulation.ins_class import InsClass, draw_instrument
 from groundstation.simulation.ins_draw import draw_heading_wander, draw_sensor_errors
 from groundstation.simulation.ins_errors import SensorErrors, propagate
 from groundstation.simulation.ins_units.settings import UnitDrift, UnitsSettings, UnitTilt, UnitTwin
 from groundstation.simulation.ins_units.unit_faults import UnitErrors, UnitRecord, with_error_faults, with_output_faults
 from groundstation.simulation.processes import gauss_markov
-from groundstation.simulation.readings import quantised, quantised_heading
+from groundstation.simulation.readings import in_steps, quantised_heading
 from groundstation.simulation.routes import Route, draw_route
 
 GUST_S = 20.0
@@ -119,7 +119,7 @@ def _with_gusts(route: Route, gust_mps: float, rng: np.random.Generator) -> Rout
     gust = airborne * gauss_markov(rng, (2, len(speed)), step_s, gust_mps, GUST_S)
     moved = np.zeros_like(gust)
     moved[:, 1:] = np.cumsum(0.5 * step_s * (gust[:, 1:] + gust[:, :-1]), axis=1)
-    latitude, longitude = _displaced(motion.latitude_deg[0], route.longitude_deg, motion.altitude_m[0], moved.T)
+    latitude, longitude = displaced_deg(motion.latitude_deg[0], route.longitude_deg, motion.altitude_m[0], moved.T)
     gusty = replace(
         motion,
         latitude_deg=latitude,
@@ -127,16 +127,6 @@ def _with_gusts(route: Route, gust_mps: float, rng: np.random.Generator) -> Rout
         velocity_east_mps=motion.velocity_east_mps[0] + gust[1],
     )
     return Route(gusty, longitude)
-
-
-def _displaced(
-    latitude_deg: FloatArray, longitude_deg: FloatArray, altitude_m: FloatArray, moved_m: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return places ``moved_m`` (north, east; shape (n, 2)) away on the local tangent."""
-    meridian, prime_vertical = curvature_radii_m(latitude_deg)
-    parallel = (prime_vertical + altitude_m) * np.cos(np.deg2rad(latitude_deg))
-    latitude = latitude_deg + np.rad2deg(moved_m[:, 0] / (meridian + altitude_m))
-    return np.asarray(latitude), np.asarray(wrap_180(longitude_deg + np.rad2deg(moved_m[:, 1] / parallel)))
 
 
 def _errors_of(settings: UnitsSettings, truth: Route, number: int, streams: _Streams) -> UnitErrors:
@@ -237,7 +227,7 @@ def _record(settings: UnitsSettings, truth: Route, errors: UnitErrors, number: i
     motion, output = truth.motion, settings.output
     rng = streams.of_unit(str(number))("output")
     noise = rng.standard_normal((len(motion.time_s), 3))
-    latitude, longitude = _displaced(
+    latitude, longitude = displaced_deg(
         motion.latitude_deg[0], truth.longitude_deg, motion.altitude_m[0], errors.position_m
     )
     velocity = np.stack([motion.velocity_north_mps[0], motion.velocity_east_mps[0]], axis=1) + errors.velocity_mps
@@ -250,19 +240,15 @@ def _record(settings: UnitsSettings, truth: Route, errors: UnitErrors, number: i
         topic="ins" if number == 1 else f"ins.{number - 1}",
         serials=((0.0, f"SIM-{100 + number}"),),
         stamp_s=motion.time_s,
-        latitude_deg=_rounded(latitude, output.position_step_deg),
-        longitude_deg=_rounded(longitude, output.position_step_deg),
+        latitude_deg=in_steps(latitude, output.position_step_deg),
+        longitude_deg=in_steps(longitude, output.position_step_deg),
         altitude_m=motion.altitude_m[0],
-        velocity_mps=_rounded(velocity, output.velocity_step_mps),
-        velocity_down_mps=_rounded(motion.velocity_down_mps[0], output.velocity_step_mps),
+        velocity_mps=in_steps(velocity, output.velocity_step_mps),
+        velocity_down_mps=in_steps(motion.velocity_down_mps[0], output.velocity_step_mps),
         heading_deg=heading_deg,
-        roll_deg=_rounded(motion.roll_deg[0], output.heading_step_deg),
+        roll_deg=in_steps(motion.roll_deg[0], output.heading_step_deg),
         errors=errors,
     )
-
-
-def _rounded(values: FloatArray, step: float) -> FloatArray:
-    return quantised(values, step) if step else np.asarray(values)
 
 
 def _with_twins(settings: UnitsSettings, records: list[UnitRecord]) -> tuple[UnitRecord, ...]:
@@ -278,12 +264,12 @@ def _gnss(settings: UnitsSettings, truth: Route, rng: np.random.Generator) -> Gn
     if not settings.has_gnss:
         return None
     motion = truth.motion
-    n, model = len(motion.time_s), settings.gnss
-    position, velocity = _gnss_errors(model, n, settings.step_s, rng)
+    n = len(motion.time_s)
+    position, velocity = draw_gnss_errors(settings.gnss, n, settings.step_s, rng)
     kept = np.ones(n, dtype=bool)
     for outage in settings.outages:
         kept &= (motion.time_s < outage.from_s) | (motion.time_s >= outage.to_s)
-    latitude, longitude = _displaced(motion.latitude_deg[0], truth.longitude_deg, motion.altitude_m[0], position)
+    latitude, longitude = displaced_deg(motion.latitude_deg[0], truth.longitude_deg, motion.altitude_m[0], position)
     ground = np.stack([motion.velocity_north_mps[0], motion.velocity_east_mps[0]], axis=1)
     return GnssRecord(
         motion.time_s[kept],
@@ -292,12 +278,3 @@ def _gnss(settings: UnitsSettings, truth: Route, rng: np.random.Generator) -> Gn
         motion.altitude_m[0][kept],
         (ground + velocity)[kept],
     )
-
-
-def _gnss_errors(
-    model: GnssErrorModel, n: int, step_s: float, rng: np.random.Generator
-) -> tuple[FloatArray, FloatArray]:
-    white = rng.standard_normal((4, n))
-    slow_m = gauss_markov(rng, (2, n), step_s, model.position_correlated_m, model.position_correlation_s)
-    slow_mps = gauss_markov(rng, (2, n), step_s, model.velocity_correlated_mps, model.velocity_correlation_s)
-    return (model.position_white_m * white[:2] + slow_m).T, (model.velocity_white_mps * white[2:] + slow_mps).T

@@ -5,19 +5,11 @@ from typing import ClassVar, Literal, TypeAlias
 
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import check_ranges, number, required_number
-from groundstation.simulation.inertial_family import GnssErrorModel
+from groundstation.simulation.inertial_family import ORDINARY_RECEIVER, GnssErrorModel
 from groundstation.simulation.ins_class import InsClass, load_ins_class
 from groundstation.simulation.routes import RouteKind
 
 MOST_UNITS = 9
-RECEIVER = GnssErrorModel(
-    position_white_m=2.0,
-    position_correlated_m=3.0,
-    position_correlation_s=300.0,
-    velocity_white_mps=0.03,
-    velocity_correlated_mps=0.02,
-    velocity_correlation_s=60.0,
-)
 
 
 @dataclass(frozen=True)
@@ -228,7 +220,7 @@ class UnitsSettings:
     duration_s: float = number(7200.0, 600.0, 50_000.0)
     step_s: float = number(1.0, 0.1, 10.0)
     each_its_own: bool = False
-    gnss: GnssErrorModel = RECEIVER
+    gnss: GnssErrorModel = ORDINARY_RECEIVER
     has_gnss: bool = True
     outages: tuple[GnssOutage, ...] = ()
     gust_mps: float = number(0.3, 0.0, 10.0)

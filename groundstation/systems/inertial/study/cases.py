@@ -29,14 +29,6 @@ NEW_ROUTES: dict[str, RouteKind] = {
     "racetrack": "racetrack",
     "late_survey": "late_survey",
 }
-RECEIVER = SimulatedGnss(
-    position_white_m=2.0,
-    position_correlated_m=3.0,
-    position_correlation_s=300.0,
-    velocity_white_mps=0.03,
-    velocity_correlated_mps=0.02,
-    velocity_correlation_s=60.0,
-)
 
 
 @dataclass(frozen=True)
@@ -128,7 +120,7 @@ def study_cases(seed: int) -> tuple[FilterCase, ...]:
 
 def full_case(name: str, title: str, ins_class: str, route: RouteKind, seed: int) -> FilterCase:
     """Return a case of full truth, filtered with the noise of its class as shipped."""
-    family = FamilySettings(ins=ins_class, route=route, gnss=RECEIVER)
+    family = FamilySettings(ins=ins_class, route=route, gnss=ORDINARY_RECEIVER)
     noise = load_class(ins_class)
     return FilterCase(name, title, family, seed, noise, uses_velocity=True, is_calibrated=True, is_held_out=True)
 

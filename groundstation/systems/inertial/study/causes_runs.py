@@ -10,11 +10,10 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.methods.ins_noise import load_class
-from groundstation.simulation.inertial_family import GnssErrorModel
+from groundstation.simulation.inertial_family import ORDINARY_RECEIVER, GnssErrorModel, draw_gnss_errors
 from groundstation.simulation.ins_class import InsClass, draw_instrument, load_ins_class
 from groundstation.simulation.ins_draw import DPH, MICRO_G, draw_sensor_errors
 from groundstation.simulation.ins_errors import InsErrors, SensorErrors, TrueMotion, propagate
-from groundstation.simulation.processes import gauss_markov
 from groundstation.simulation.routes import Route, RouteKind, draw_route
 from groundstation.systems.inertial.cause_answer import CausesResult, Within95
 from groundstation.systems.inertial.cause_fit import (
@@ -47,7 +46,6 @@ Progress = Callable[[str], None]
 
 FIRST_SEED, SEEDS_PER_STUDY = 70_000, 10
 DURATION_S = 16_000.0
-RECEIVER = GnssErrorModel(2.0, 3.0, 300.0, 0.03, 0.02, 60.0)  # docs/forecast-family.md
 SLOW_RECEIVER = GnssErrorModel(2.0, 10.0, 300.0, 0.03, 0.06, 300.0)
 WARM_UP_DPH, WARM_UP_S = 0.03, 2400.0  # a gyro that settles from it, by exponential
 GRAVITY_ARCSEC, GRAVITY_KM = 20.0, 100.0  # deflection over mountains
@@ -166,7 +164,7 @@ def fly_causes(case: CauseCase, seed: np.random.SeedSequence, duration_s: float 
         sensors = replace(sensors, gyro_radps=sensors.gyro_radps + ramp[None])
     errors = propagate(route.motion, sensors, body_fixed=ins.is_strapdown)
     fixed = streams("ins constants").standard_normal(40)  # as draw_sensor_errors has them
-    receiver = SLOW_RECEIVER if case.broken == "slow GNSS" else RECEIVER
+    receiver = SLOW_RECEIVER if case.broken == "slow GNSS" else ORDINARY_RECEIVER
     differences = _differences(route, errors, receiver, streams("gnss"))
     noise, motion = load_class(case.ins), route.motion
     model = ChannelModel.at(float(np.mean(motion.latitude_deg)), float(np.mean(motion.altitude_m)), noise.beta_per_s)
@@ -182,19 +180,13 @@ def fly_causes(case: CauseCase, seed: np.random.SeedSequence, duration_s: float 
 
 def _differences(route: Route, errors: InsErrors, receiver: GnssErrorModel, rng: np.random.Generator) -> InsDifferences:
     motion, n = route.motion, len(route.motion.time_s)
-    white = rng.standard_normal((4, n))
-    position = receiver.position_white_m * white[:2] + gauss_markov(
-        rng, (2, n), 1.0, receiver.position_correlated_m, receiver.position_correlation_s
-    )
-    velocity = receiver.velocity_white_mps * white[2:] + gauss_markov(
-        rng, (2, n), 1.0, receiver.velocity_correlated_mps, receiver.velocity_correlation_s
-    )
+    position, velocity = draw_gnss_errors(receiver, n, 1.0, rng)
     ground = _ground_mps(motion)
     latitude, altitude = motion.latitude_deg[0], motion.altitude_m[0]
     epochs = DifferenceEpochs(
         motion.time_s,
-        errors.position_m[0] - position.T,
-        errors.velocity_mps[0] - velocity.T,
+        errors.position_m[0] - position,
+        errors.velocity_mps[0] - velocity,
         drag_per_s(latitude, altitude, ground),
         np.zeros(n, dtype=bool),
     )
