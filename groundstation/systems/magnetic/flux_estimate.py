@@ -1,17 +1,17 @@
 """Deviation of a flux valve in flight: straight legs and turns against a true heading."""
 
 import math
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180
 from groundstation.base.errors import NotAssessableError
+from groundstation.base.records import BoolArray
 from groundstation.base.words import listed
-from groundstation.methods import harmonics
 from groundstation.results.figures import FigureData
 from groundstation.results.roles import LETTERS
-from groundstation.systems.magnetic.answer import SigmaPart
+from groundstation.systems.magnetic.answer import Residual, SigmaPart
 from groundstation.systems.magnetic.arrays import FluxCurve, FluxEpochRows
 from groundstation.systems.magnetic.compass_table import CENTRES_DEG
 from groundstation.systems.magnetic.flux_answer import (
@@ -37,7 +37,7 @@ from groundstation.systems.magnetic.flux_reference import OtherAnswers, Rows, Tr
 from groundstation.systems.magnetic.flux_remarks import flux_remarks
 from groundstation.systems.magnetic.flux_settings import MagneticFluxSettings
 from groundstation.systems.magnetic.flux_turns import OppositeMethod, by_opposite_turns
-from groundstation.systems.magnetic.flux_verdict import flux_decide, flux_gates
+from groundstation.systems.magnetic.flux_verdict import flux_gates
 from groundstation.systems.magnetic.ground_answer import GroundCoefficient
 from groundstation.systems.magnetic.ground_epochs import logged_variation_deg, step_of
 from groundstation.systems.magnetic.ground_fit import (
@@ -45,12 +45,14 @@ from groundstation.systems.magnetic.ground_fit import (
     along_axis,
     coefficients_of,
     directions_of,
+    whole_curve,
     widest_gap_deg,
     with_declination,
 )
 from groundstation.systems.magnetic.manoeuvre import covered_bins
 from groundstation.systems.magnetic.settings import MagneticSettings
 from groundstation.systems.magnetic.swings import steer_card
+from groundstation.systems.magnetic.verdict import decide
 from groundstation.tables.phases import Phases, flight_phases
 from groundstation.tables.table import Flight
 
@@ -60,6 +62,22 @@ NEEDED = "straight legs on four headings round the circle"
 SLOW_SIGMA_DEG: dict[ReferenceName, float] = {"states": 0.2, "ins": 0.2, "wind": 1.0}  # of a true heading, over minutes
 NEAR_DEG = 45.0  # a heading no farther from its neighbours counts as flown
 MOST_DRAWN = 4000
+
+
+@dataclass(frozen=True)
+class _Chosen:
+    """Method that is recommended: its fit, A to E, and the part of the circle it rests on.
+
+    ``legs_row`` is that of the legs, taken or not; ``covered`` (360,) are the degrees near a heading flown.
+    """
+
+    name: FluxMethodName
+    fit: CurveFit
+    coefficients: tuple[GroundCoefficient, ...]
+    legs_row: FluxMethod
+    covered: BoolArray
+    gap_deg: float
+    residual: Residual | None
 
 
 def estimate_flux_deviation(
@@ -110,26 +128,21 @@ def estimate_flux_deviation(
         raise NotAssessableError(ANALYSIS, text)
     legs = find_legs(epochs, settings)
     known = true_headings(flight, topic, epochs, legs, settings, magnetic, others)
+    level = math.hypot(epochs.used.sigma_deg, known.common_sigma_deg)  # that all errors share
     error = wrap_180(epochs.heading_deg + epochs.declination_deg - known.true_deg)
     name = known.references[0].name
     bank, cells = fit_bank(epochs, error, SLOW_SIGMA_DEG[name], settings, is_by_wind=name == "wind")
     step = step_of(flight[topic], "magnetic_heading_deg")
     values = leg_values(epochs, legs, known, error, step, settings)
-    turns = by_opposite_turns(epochs, known.true_deg, bank, cells, _level_sigma(epochs, known), settings, magnetic)
-    if len(values.rows) < LEAST_LEGS and turns.values_deg is None:
+    turns = by_opposite_turns(epochs, known.true_deg, bank, cells, level, settings, magnetic)
+    if len(values.rows) < LEAST_LEGS and turns.fit is None:
         raise NotAssessableError(ANALYSIS, _why_no_leg(legs, values, settings), NEEDED)
+    chosen = _choose(values, cells, turns, level, settings)
     found = replace(
-        _answer(epochs, topic, legs, values, known, bank, cells, turns, settings),
+        _answer(epochs, topic, legs, values, known, bank, chosen, turns, level, settings),
         logged_variation_deg=logged_variation_deg(flight, topic, epochs.time_ns),
         heading_step_deg=step,
-    )
-    verdict, reason = flux_decide(found.gates)
-    fit = _recommended_fit(found.recommended_method, values, cells, turns, settings)
-    found = replace(
-        found,
-        verdict=verdict,
-        verdict_reason=reason,
-        figures=_figures(epochs, error, values, cells, fit, found, _level_sigma(epochs, known)),
+        figures=_figures(epochs, error, values, cells, chosen, level),
     )
     return replace(found, remarks=flux_remarks(found, _is_levelled(flight, topic), settings))
 
@@ -141,73 +154,85 @@ def _answer(
     values: LegValues,
     known: TrueHeadings,
     bank: BankError,
-    cells: tuple[LagCell, ...],
+    chosen: _Chosen,
     turns: OppositeMethod,
+    level_deg: float,
     settings: MagneticFluxSettings,
 ) -> FluxDeviation:
-    level = _level_sigma(epochs, known)
-    fit = fit_legs(values, cells, settings) if len(values.rows) >= LEAST_LEGS else None
-    by_legs = coefficients_of(fit, level, settings) if fit is not None else ()
-    row = _legs_row(by_legs, fit, level, values)
-    name = _recommend(by_legs, row, turns)
-    chosen = _recommended_fit(name, values, cells, turns, settings)
-    coefficients = by_legs if name == "straight_legs" else _all_found(turns)
-    if any(row.state != "found" for row in coefficients[:3]):
-        raise NotAssessableError(ANALYSIS, _why_open(coefficients, values, level, settings), NEEDED)
-    covered, gap = _covered(values, turns, name)
-    residual = (
-        left_over(values, cells, settings) if name == "straight_legs" else left_by_turns(values, chosen.values_deg)
-    )
-    covariance = with_declination(chosen.covariance, level)
-    sigma = np.sqrt(np.diag(covariance))
+    fit, is_by_legs = chosen.fit, chosen.name == "straight_legs"
+    sigma = np.sqrt(np.diag(with_declination(fit.covariance, level_deg)))
     gates = flux_gates(
         {
-            "gap": gap,
+            "gap": chosen.gap_deg,
             "curve": float(np.sqrt(0.5 * np.sum(sigma[1:] ** 2))),
             "level": float(sigma[0]),
-            "left": residual.after if residual else None,
+            "left": chosen.residual.after if chosen.residual else None,
             "dip": None if epochs.dip_deg is None else abs(epochs.dip_deg),
         },
         settings,
     )
-    deviation = -wrap_180(harmonics.design(CENTRES_DEG) @ chosen.values_deg)
+    verdict, reason = decide(gates)
+    deviation = -whole_curve(fit, CENTRES_DEG, level_deg)[0]
     by_letter = dict(zip(LETTERS, map(float, sigma), strict=True))
     return FluxDeviation(
         ins_topic=topic,
-        verdict="undecided",
-        verdict_reason="",
-        recommended_method=name,
+        verdict=verdict,
+        verdict_reason=reason,
+        recommended_method=chosen.name,
         references=known.references,
         declination=epochs.used,
-        legs=_told_legs(epochs, legs, values, level),
-        methods=(row, turns.row),
-        coefficients=coefficients,
-        a_parts=_a_parts(chosen, epochs, known),
+        legs=_told_legs(epochs, legs, values, level_deg),
+        methods=(chosen.legs_row, turns.row),
+        coefficients=chosen.coefficients,
+        a_parts=_a_parts(fit, epochs, known),
         bank_error=bank,
         directions=len(directions_of(values.heading_deg, settings.repeat_within_deg)),
-        widest_gap_deg=gap,
+        widest_gap_deg=chosen.gap_deg,
         settle_s=settings.settle_s,
-        place_sigma_deg=chosen.place_sigma_deg,
+        place_sigma_deg=fit.place_sigma_deg,
         gates=gates,
-        card=steer_card(deviation, by_letter, covered, settings.card_step_deg),
+        card=steer_card(deviation, by_letter, chosen.covered, settings.card_step_deg),
         deviation_deg=tuple(map(float, deviation)),
         wind=_wind_told(epochs, known),
-        along=along_axis(chosen, coefficients, settings) if name == "straight_legs" else None,
-        residual_rms_deg=residual,
+        along=along_axis(fit, chosen.coefficients, settings) if is_by_legs else None,
+        residual_rms_deg=chosen.residual,
         dip_deg=epochs.dip_deg,
         settings={name: value for name, value in asdict(settings).items() if value is not None},
     )
 
 
-def _level_sigma(epochs: FluxEpochs, known: TrueHeadings) -> float:
-    """Sigma that all errors share: declination and reference."""
-    return math.hypot(epochs.used.sigma_deg, known.common_sigma_deg)
+def _choose(
+    values: LegValues,
+    cells: tuple[LagCell, ...],
+    turns: OppositeMethod,
+    level_deg: float,
+    settings: MagneticFluxSettings,
+) -> _Chosen:
+    """Fit the legs, and take that or the opposite turns.
+
+    Raises
+    ------
+    NotAssessableError
+        When what is taken does not show A, B and C.
+    """
+    by_legs = fit_legs(values, cells, settings) if len(values.rows) >= LEAST_LEGS else None
+    shown = coefficients_of(by_legs, level_deg, settings) if by_legs is not None else ()
+    row = _legs_row(shown, values)
+    if turns.fit is not None and (by_legs is None or _tell_turns_more(shown, turns.row)):
+        told = tuple(
+            GroundCoefficient(letter, turns.row.coefficients_deg[letter], sigma, "found")
+            for letter, sigma in turns.row.coefficients_sigma_deg.items()
+        )
+        residual = left_by_turns(values, turns.fit.values_deg)
+        return _Chosen("opposite_turns", turns.fit, told, row, np.ones(360, dtype=bool), 0.0, residual)
+    if by_legs is None or any(one.state != "found" for one in shown[:3]):
+        raise NotAssessableError(ANALYSIS, _why_open(shown, values, level_deg, settings), NEEDED)
+    covered, gap = covered_bins(values.heading_deg, 2.0 * NEAR_DEG), widest_gap_deg(values.heading_deg)
+    return _Chosen("straight_legs", by_legs, shown, row, covered, gap, left_over(values, cells, settings))
 
 
-def _legs_row(
-    coefficients: tuple[GroundCoefficient, ...], fit: CurveFit | None, level_deg: float, values: LegValues
-) -> FluxMethod:
-    if fit is None:
+def _legs_row(coefficients: tuple[GroundCoefficient, ...], values: LegValues) -> FluxMethod:
+    if not coefficients:
         return FluxMethod("straight_legs", "refused", f"{len(values.rows)} straight legs with a true heading")
     found = [one for one in coefficients if one.value_deg is not None]
     return FluxMethod(
@@ -220,42 +245,13 @@ def _legs_row(
     )
 
 
-def _recommend(coefficients: tuple[GroundCoefficient, ...], row: FluxMethod, turns: OppositeMethod) -> FluxMethodName:
-    """Return the legs, or opposite turns where those tell more, or the same better."""
-    if turns.values_deg is None:
-        return "straight_legs"
+def _tell_turns_more(coefficients: tuple[GroundCoefficient, ...], turns: FluxMethod) -> bool:
+    """Tell whether opposite turns tell more than the legs, or the same better."""
     seen = {one.letter: one.sigma_deg for one in coefficients if one.state == "found"}
-    if set("ABCDE") - set(seen):
-        return "opposite_turns"
-    legs, other = (sum(sigma[letter] ** 2 for letter in "BCDE") for sigma in (seen, turns.row.coefficients_sigma_deg))
-    return "straight_legs" if legs <= other else "opposite_turns"
-
-
-def _recommended_fit(
-    name: FluxMethodName,
-    values: LegValues,
-    cells: tuple[LagCell, ...],
-    turns: OppositeMethod,
-    settings: MagneticFluxSettings,
-) -> CurveFit:
-    if name == "opposite_turns" and turns.values_deg is not None and turns.covariance is not None:
-        return CurveFit(turns.values_deg, turns.covariance, 0.0)
-    return fit_legs(values, cells, settings)
-
-
-def _all_found(turns: OppositeMethod) -> tuple[GroundCoefficient, ...]:
-    row = turns.row
-    return tuple(
-        GroundCoefficient(letter, row.coefficients_deg[letter], row.coefficients_sigma_deg[letter], "found")
-        for letter in LETTERS
-    )
-
-
-def _covered(values: LegValues, turns: OppositeMethod, name: FluxMethodName) -> tuple[np.ndarray, float]:
-    """Return the degrees near a heading flown, and the widest part that is not flown."""
-    if name == "opposite_turns":
-        return np.ones(360, dtype=bool), 0.0
-    return covered_bins(values.heading_deg, 2.0 * NEAR_DEG), widest_gap_deg(values.heading_deg)
+    if set(LETTERS) - set(seen):
+        return True
+    legs, other = (sum(sigma[letter] ** 2 for letter in "BCDE") for sigma in (seen, turns.coefficients_sigma_deg))
+    return legs > other
 
 
 def _a_parts(fit: CurveFit, epochs: FluxEpochs, known: TrueHeadings) -> tuple[SigmaPart, ...]:
@@ -309,8 +305,7 @@ def _figures(
     error_deg: FloatArray,
     values: LegValues,
     cells: tuple[LagCell, ...],
-    fit: CurveFit,
-    found: FluxDeviation,
+    chosen: _Chosen,
     level_deg: float,
 ) -> tuple[FigureData, ...]:
     best = max(cells, key=lambda one: one.weight)
@@ -319,15 +314,7 @@ def _figures(
         leg[first:last] = place + 1
     rows = np.flatnonzero(epochs.is_airborne & np.isfinite(error_deg))
     rows = rows[:: max(1, -(-len(rows) // MOST_DRAWN))]
-    columns = harmonics.design(CENTRES_DEG)
-    covariance = with_declination(fit.covariance, level_deg)
-    sigma = np.sqrt(np.einsum("ni,ij,nj->n", columns, covariance, columns))
-    covered, _gap = (
-        (np.ones(360, dtype=bool), 0.0)
-        if found.recommended_method == "opposite_turns"
-        else (covered_bins(values.heading_deg, 2.0 * NEAR_DEG), 0.0)
-    )
-    curve = wrap_180(columns @ fit.values_deg)
+    curve, sigma = whole_curve(chosen.fit, CENTRES_DEG, level_deg)
     return (
         FluxEpochRows(
             time_s=epochs.time_s[rows],
@@ -341,9 +328,9 @@ def _figures(
             uncorrected_magnetic_heading_deg=CENTRES_DEG,
             heading_error_deg=curve,
             heading_error_sigma_deg=sigma,
-            deviation_to_add_deg=np.array(found.deviation_deg),
+            deviation_to_add_deg=-curve,
             deviation_sigma_deg=sigma,
-            is_interpolated=~covered,
+            is_interpolated=~chosen.covered,
         ),
     )
 

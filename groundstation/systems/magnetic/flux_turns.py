@@ -15,6 +15,7 @@ from groundstation.systems.magnetic.flux_answer import BankError, FluxMethod, Fl
 from groundstation.systems.magnetic.flux_bank import CIRCLE_DEG, LagCell, turns_bias
 from groundstation.systems.magnetic.flux_epochs import GRAVITY_MPS2, FluxEpochs
 from groundstation.systems.magnetic.flux_settings import MagneticFluxSettings
+from groundstation.systems.magnetic.ground_fit import CurveFit
 from groundstation.systems.magnetic.manoeuvre import find_figures, find_turns
 from groundstation.systems.magnetic.readings import Readings
 from groundstation.systems.magnetic.settings import MagneticSettings
@@ -25,12 +26,10 @@ LEAST_READINGS = 40
 
 @dataclass(frozen=True)
 class OppositeMethod:
-    """The row of the method, its coefficients and covariance, and the turns looked at."""
+    """The row of the method, and its fit where it is not refused."""
 
     row: FluxMethod
-    values_deg: FloatArray | None = None
-    covariance: FloatArray | None = None
-    turns: tuple[Turn, ...] = ()
+    fit: CurveFit | None = None
 
 
 def by_opposite_turns(
@@ -52,16 +51,15 @@ def by_opposite_turns(
     if len(readings) < LEAST_READINGS:
         return _refused("hardly a reading with a true heading and a bank")
     figures, turns = find_figures(readings, find_turns(readings, epochs.is_airborne[rows], magnetic), magnetic)
-    told = tuple(one.turn for one in turns)
     if not figures:
-        return _refused(_why(told), told)
+        return _refused(_why(tuple(one.turn for one in turns)))
     right, left = (np.sort(np.concatenate([one.rows(side) for one in figures])) for side in (True, False))
     table = build_table(readings.magnetic_heading_deg, readings.compass_error_deg, right, left)
     values = table.coefficients_deg.copy()
     declination = float(np.mean(epochs.declination_deg[rows][right]))
     values[0] = wrap_180(values[0] + declination)
     if bank.state != "found":
-        return _refused(f"the bank error is not known: {bank.reason}", told)
+        return _refused(f"the bank error is not known: {bank.reason}")
     flown = float(np.mean(np.abs(readings.roll_deg[np.concatenate([right, left])])))
     speed = float(np.nanmedian(epochs.speed_mps[rows][right]))
     rate = DEG_PER_RAD * GRAVITY_MPS2 * np.tan(np.deg2rad(flown)) / speed
@@ -69,7 +67,7 @@ def by_opposite_turns(
     size = float(np.sqrt(np.mean(bias**2)))
     if size > settings.turns_bias_max_deg:
         reason = f"bank and lag leave {size:.2g} deg rms in the mean of turns at {flown:.0f} deg of bank"
-        return _refused(f"{reason}, at most {settings.turns_bias_max_deg:g}", told)
+        return _refused(f"{reason}, at most {settings.turns_bias_max_deg:g}")
     added = harmonics.fit(CIRCLE_DEG, bias)[0]
     covariance = table.covariance + np.diag(added**2)
     sigma = np.sqrt(np.diag(covariance) + np.array([common_sigma_deg**2, 0.0, 0.0, 0.0, 0.0]))
@@ -81,7 +79,7 @@ def by_opposite_turns(
         dict(zip(LETTERS, map(float, values), strict=True)),
         dict(zip(LETTERS, map(float, sigma), strict=True)),
     )
-    return OppositeMethod(row, values, covariance, told)
+    return OppositeMethod(row, CurveFit(values, covariance, 0.0))
 
 
 def _readings(epochs: FluxEpochs, true_deg: FloatArray) -> tuple[Readings, np.ndarray]:
@@ -113,5 +111,5 @@ def _why(turns: tuple[Turn, ...]) -> str:
     )
 
 
-def _refused(reason: str, turns: tuple[Turn, ...] = ()) -> OppositeMethod:
-    return OppositeMethod(FluxMethod(NAME, "refused", reason), turns=turns)
+def _refused(reason: str) -> OppositeMethod:
+    return OppositeMethod(FluxMethod(NAME, "refused", reason))

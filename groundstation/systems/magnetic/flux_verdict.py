@@ -4,10 +4,9 @@ from collections.abc import Mapping
 
 from groundstation.results.gates import Bound, Gate, judged_gate
 from groundstation.results.rules import Rejudged
-from groundstation.systems.magnetic.answer import MagneticVerdict
 from groundstation.systems.magnetic.flux_answer import FluxDeviation
 from groundstation.systems.magnetic.flux_settings import MagneticFluxSettings
-from groundstation.systems.magnetic.verdict import decide, told
+from groundstation.systems.magnetic.verdict import judged_under, told
 
 
 def flux_gates(values: Mapping[str, float | None], settings: MagneticFluxSettings) -> tuple[Gate, ...]:
@@ -36,14 +35,7 @@ def flux_gates(values: Mapping[str, float | None], settings: MagneticFluxSetting
 
 def flux_rejudge(answer: FluxDeviation, settings: MagneticFluxSettings) -> tuple[Rejudged, ...]:
     """Apply other limits to the gates and the verdict of an answer."""
-    bounds = _bounds(settings)
-    after = tuple(told(gate.under(bounds[gate.name])) if gate.name in bounds else gate for gate in answer.gates)
-    return (Rejudged("magnetic_flux", answer.verdict, flux_decide(after)[0], answer.gates, after),)
-
-
-def flux_decide(gates: tuple[Gate, ...]) -> tuple[MagneticVerdict, str]:
-    """Decide the verdict and its reason from the gates."""
-    return decide(gates)
+    return (judged_under(_bounds(settings), answer.analysis, answer.verdict, answer.gates),)
 
 
 def _bounds(settings: MagneticFluxSettings) -> dict[str, Bound]:

@@ -160,11 +160,17 @@ def curve(
 
     NaN where it is known no better than B alone need be.
     """
+    error, sigma = whole_curve(fit, heading_deg, declination_sigma_deg)
+    is_known = sigma <= settings.known_share * settings.semicircular_sigma_deg
+    return np.where(is_known, error, np.nan), np.where(is_known, sigma, np.nan)
+
+
+def whole_curve(fit: CurveFit, heading_deg: FloatArray, declination_sigma_deg: float) -> tuple[FloatArray, FloatArray]:
+    """Return the error and its sigma at magnetic headings, shapes (n,), however little is known."""
     columns = harmonics.design(heading_deg)
     covariance = with_declination(fit.covariance, declination_sigma_deg)
     sigma = np.sqrt(np.einsum("ni,ij,nj->n", columns, covariance, columns))
-    is_known = sigma <= settings.known_share * settings.semicircular_sigma_deg
-    return np.where(is_known, wrap_180(columns @ fit.values_deg), np.nan), np.where(is_known, sigma, np.nan)
+    return wrap_180(columns @ fit.values_deg), sigma
 
 
 def directions_of(heading_deg: FloatArray, within_deg: float) -> list[list[int]]:

@@ -1,5 +1,6 @@
 """Gates and verdict of the magnetic deviation."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from groundstation.results.gates import Bound, Gate, GateState, judged_gate
@@ -142,9 +143,15 @@ def rejudge(answer: MagneticResult, settings: MagneticSettings) -> tuple[Rejudge
 
     The values are those that it was judged by.
     """
-    bounds = gate_bounds(settings)
-    after = tuple(told(gate.under(bounds[gate.name])) if gate.name in bounds else gate for gate in answer.gates)
-    return (Rejudged("magnetic", answer.verdict, decide(after)[0], answer.gates, after),)
+    return (judged_under(gate_bounds(settings), answer.analysis, answer.verdict, answer.gates),)
+
+
+def judged_under(
+    bounds: Mapping[str, Bound], analysis: str, verdict: MagneticVerdict, gates: tuple[Gate, ...]
+) -> Rejudged:
+    """Apply bounds to gates, and decide the verdict anew."""
+    after = tuple(told(gate.under(bounds[gate.name])) if gate.name in bounds else gate for gate in gates)
+    return Rejudged(analysis, verdict, decide(after)[0], gates, after)
 
 
 def decide(gates: tuple[Gate, ...]) -> tuple[MagneticVerdict, str]:
