@@ -7,6 +7,7 @@ from groundstation.base.angles import FloatArray
 ELLIPSE_95 = float(np.sqrt(-2.0 * np.log(0.05)))  # sigmas of the ellipse that holds 95 % of a normal pair
 ROUND = np.linspace(0.0, 2.0 * np.pi, 49)
 SEEN_SHARE = 0.03  # least width of an ellipse that is seen, as a share of the map's side
+LARGEST_SHARE = 0.1  # most that an enlarged ellipse is wide about its middle, as such a share
 
 
 def principal_axes(
@@ -56,15 +57,28 @@ def outlines(sigma_north: FloatArray, sigma_east: FloatArray, correlation: Float
     return sigmas * np.stack([north, east], axis=2)
 
 
-def magnified(side_m: float, half_m: float) -> int:
-    """Return the factor by which an ellipse is enlarged on a map: 1, 2, 5, 10, 20 ...
+def magnified(side_m: float, half_m: FloatArray) -> int:
+    """Return the factor by which ellipses are enlarged on a map: 1, 2, 5, 10, 20 ...
+
+    An ellipse of the middle size is then seen, and the largest leaves the map to the track.
+
+    Parameters
+    ----------
+    side_m : float
+        Side of the map.
+    half_m : ndarray, shape (n,)
+        Half width of each ellipse; NaN where it has none.
 
     Examples
     --------
-    >>> magnified(100.0, 5.0), magnified(10_000.0, 2.0), magnified(0.0, 0.0)
-    (1, 100, 1)
+    >>> one = lambda side_m, *half_m: magnified(side_m, np.array(half_m))
+    >>> one(100.0, 5.0), one(10_000.0, 2.0), one(10_000.0, 2.0, 2.0, 40.0), one(0.0, 0.0), one(1.0)
+    (1, 100, 20, 1, 1)
     """
-    wanted = SEEN_SHARE * side_m / half_m if half_m > 0.0 else 1.0
+    half_m = half_m[half_m > 0.0]
+    if not len(half_m):
+        return 1
+    wanted = side_m * min(SEEN_SHARE / float(np.median(half_m)), LARGEST_SHARE / float(half_m.max()))
     if not 1.0 <= wanted < np.inf:
         return 1
     decade: int = 10 ** int(np.floor(np.log10(wanted)))

@@ -17,6 +17,15 @@ def answer_chapters(results: FlightResults, chapters: Chapters) -> tuple[Section
     return tuple(sorted(every, key=_place))
 
 
+def dangers(results: FlightResults, chapters: Chapters) -> frozenset[str]:
+    """Return the names of the analyses whose chapters tell of a danger."""
+    listed = [chapter for chapter in chapters.flight if any(map(results.answer, chapter.answers))]
+    claims = (
+        (one.name, section and section.claim) for one, section in zip(listed, _built(listed, results), strict=True)
+    )
+    return frozenset(name for name, claim in claims if claim is not None and claim.is_danger)
+
+
 def _place(section: Section) -> tuple[bool, Rank]:
     return (True, Rank.OTHER) if section.claim is None else section.claim.place
 

@@ -32,7 +32,7 @@ class CorrectedPosition:
     def larger(self, side_m: float) -> int:
         """Return the factor by which the 95 % ellipses are enlarged on a map of a given side."""
         half_m = ELLIPSE_95 * np.hypot(self.sigma_north_m, self.sigma_east_m)[self.along()]
-        return magnified(side_m, float(np.median(half_m)))
+        return magnified(side_m, half_m)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from groundstation.base.failures import attempt, failures, gathered_failures, is
 from groundstation.base.findings import SEVERITIES, Finding, worst
 from groundstation.base.records import RecordBatch
 from groundstation.base.to_disk import sync_folder
+from groundstation.chapters.by_answer import dangers
 from groundstation.pipeline.one_flight.analyse import Given, analyse
 from groundstation.pipeline.one_flight.apply import apply_step, corrected_name, write_derived
 from groundstation.pipeline.one_flight.convert import Converted, convert_flight, parts_told
@@ -346,11 +347,13 @@ def state_of(findings: tuple[Finding, ...], has_lost_data: bool, fail_on: str) -
 
 
 def sentence(results: FlightResults) -> str:
-    """Return the results of a flight in one line."""
-    told = (attempt("line", one.name, one.sentence, results.answers) for one in systems().analyses)
-    found = [text for text in told if text]
+    """Return the results of a flight in one line; what a report opens with as a danger stands first."""
+    every = systems()
+    told = ((one.name, attempt("line", one.name, one.sentence, results.answers)) for one in every.analyses)
+    found = [(name, text) for name, text in told if text]
     if found:
-        return "; ".join(found)
+        first = dangers(results, every.chapters) if len(found) > 1 else frozenset()
+        return "; ".join(text for _name, text in sorted(found, key=lambda one: one[0] not in first))
     if not results.not_assessable:
         return recorded(results)
     first, *others = results.not_assessable

@@ -58,16 +58,18 @@ def session_map(results: FlightResults) -> Plot | None:
     ellipses = _ellipses(data, rows)
     origin = plane_through(place) if answer.frame == "ecef" else None
     plane = place if origin is None else origin.from_ecef_m(place)
-    larger, is_crowd = _magnified(plane, ellipses), _is_crowd(answer)
+    is_crowd = _is_crowd(answer)
+    of_each = {name: np.flatnonzero(vehicle == name) for name in answer.vehicle_names}
+    with_ellipse = {name: mine[-1:] if is_crowd else mine[thin(len(mine), ELLIPSES)] for name, mine in of_each.items()}
+    larger = _magnified(plane, ellipses[np.concatenate([*with_ellipse.values()])])
     x, y = plane[:, 1] / M_PER_KM, plane[:, 0] / M_PER_KM
     marks: list[AnyMark] = []
     for number, name in enumerate(answer.vehicle_names):
-        mine = np.flatnonzero(vehicle == name)
+        mine = of_each[name]
         if not len(mine):
             continue
         role, first, title = series(number), mine[:1], label(name, 12)
-        shown = mine[-1:] if is_crowd else mine[thin(len(mine), ELLIPSES)]
-        drawn = [(plane[row, :2] + larger * ellipses[row])[:, ::-1] / M_PER_KM for row in shown]
+        drawn = [(plane[row, :2] + larger * ellipses[row])[:, ::-1] / M_PER_KM for row in with_ellipse[name]]
         marks.append(Outlines(rings=tuple(drawn), magnified=larger, role=role, emphasis="faint"))
         marks.append(Curve(x=x[mine], y=y[mine], role=role, name=title))
         marks.append(Points(x=x[first], y=y[first], labels=(title,) if is_crowd else (), role=role))
@@ -105,7 +107,7 @@ def _ellipses(data: CooperativeTracks, rows: Flags) -> Floats:
 def _magnified(plane: Floats, ellipses: Floats) -> int:
     """Return the factor by which ellipses are enlarged so that they can be seen."""
     side = float(np.nanmax(np.nanmax(plane[:, :2], axis=0) - np.nanmin(plane[:, :2], axis=0)))
-    return magnified(side, float(np.nanmedian(np.hypot(*np.moveaxis(ellipses, 2, 0)))))
+    return magnified(side, np.hypot(*np.moveaxis(ellipses, 2, 0)))
 
 
 def _numbers(results: FlightResults) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from groundstation.systems.inertial.alignment_answer import (
     InsRealignment,
     StandingDrift,
 )
+from groundstation.systems.inertial.claim_chapter import lead_of
 from groundstation.systems.inertial.units_answer import Measured
 
 TITLE = "Alignment and shutdown"
@@ -41,7 +42,8 @@ def ground(results: FlightResults) -> Section | None:
     if answer is None:
         return without_answer(results, "ins_ground", TITLE, LEAD)
     parts: tuple[Part | None, ...] = (*_remarks(answer), _table(answer), _realigned(answer.realignments))
-    return Section("ins_ground", TITLE, LEAD, kept(parts), _headline(answer), claim=_claim(answer))
+    lead = lead_of(LEAD, answer.ins_topic, results)
+    return Section("ins_ground", TITLE, lead, kept(parts), _headline(answer), claim=_claim(answer))
 
 
 def _headline(answer: GroundResult) -> str:

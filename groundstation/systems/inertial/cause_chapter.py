@@ -13,6 +13,7 @@ from groundstation.systems.inertial.cause_answer import (
     StraightLeg,
     Within95,
 )
+from groundstation.systems.inertial.claim_chapter import lead_of
 from groundstation.systems.inertial.units_answer import Measured
 
 TITLE = "INS errors by cause"
@@ -61,7 +62,7 @@ def causes(results: FlightResults) -> Section | None:
     return Section(
         "ins_causes",
         TITLE,
-        LEAD,
+        lead_of(LEAD, answer.ins_topic, results),
         kept(parts),
         headline,
         claim=_claim(answer, headline),

@@ -30,7 +30,7 @@ from groundstation.systems.inertial.answer import (
     StateEstimate,
     is_left_alone,
 )
-from groundstation.systems.inertial.claim_chapter import drift_of, growth, inertial_claim, is_start_unknown
+from groundstation.systems.inertial.claim_chapter import drift_of, growth, inertial_claim, is_start_unknown, lead_of
 
 NOISE = "noise."  # what begins the names of those settings that the class gives
 PLACES = {"m": 1, "mps": 3, "arcsec": 1, "dph": 4, "dphph": 4}
@@ -45,8 +45,11 @@ def inertial(results: FlightResults) -> Section | None:
     answer = results.answer(InertialResult)
     if answer is None:
         return without_answer(results, "inertial", TITLE, LEAD)
-    if answer.kind != "unaided":
-        return aided(answer, results.answers)
+    section = aided(answer, results.answers) if answer.kind != "unaided" else _unaided(answer)
+    return replace(section, lead=lead_of(section.lead, answer.ins_topic, results))
+
+
+def _unaided(answer: InertialResult) -> Section:
     parts: tuple[Part | None, ...] = (
         *_conclusions(answer),
         Figure("inertial.state", of="position"),

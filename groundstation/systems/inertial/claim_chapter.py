@@ -48,6 +48,13 @@ def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -
     )
 
 
+def lead_of(lead: str, topic: str, results: FlightResults) -> str:
+    """Return the lead of a chapter on one INS; of a flight with several it names the one."""
+    answer = results.answer(InertialResult)
+    has_others = answer is not None and bool(answer.other_ins)
+    return f"{lead} Of several INS, this is {topic}." if has_others else lead
+
+
 def drift_of(answer: InertialResult) -> tuple[float | None, str]:
     """Return how fast the position error grows, nmi/h, and the measure of it.
 

@@ -69,8 +69,8 @@ def _notes(fleet: FleetResults) -> list[Part]:
     table = fleet.unit_flights
     parts: list[Part] = []
     if without := len(set(table.flight_id[table.ins_serial == ""].tolist())):
-        told = plural(without, "flight states", "flights state")
-        parts.append(Note(f"{told} no serial of an INS: they are in no history.", "unknown"))
+        told, are = plural(without, "flight states", "flights state"), "it is" if without == 1 else "they are"
+        parts.append(Note(f"{told} no serial of an INS: {are} in no history.", "unknown"))
     has_serial = table.ins_serial != ""
     reasons = Counter(one for one in table.reason[has_serial].tolist() if one)
     if reasons:

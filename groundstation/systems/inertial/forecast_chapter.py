@@ -11,7 +11,7 @@ from groundstation.chapters.wording import clock, is_number, number, percent, wo
 from groundstation.results.flight import FlightResults
 from groundstation.results.forecast_methods import FORECAST_METHODS
 from groundstation.systems.inertial.answer import InertialResult
-from groundstation.systems.inertial.claim_chapter import forecast_claim
+from groundstation.systems.inertial.claim_chapter import forecast_claim, lead_of
 from groundstation.systems.inertial.conclusions_chapter import conclusions, rows_of, title_of
 from groundstation.systems.inertial.forecast_answer import (
     FEWEST_STARTS,
@@ -55,7 +55,8 @@ def forecast(results: FlightResults) -> Section | None:
     told = None
     if ins is not None and ins.kind == "unaided":
         told = forecast_claim(answer, tuple(note.text for note in notes[:2]), tone)
-    return Section("forecast", TITLE, LEAD, kept(parts), headline, claim=told, appendix=kept(workings))
+    lead = LEAD if ins is None else lead_of(LEAD, ins.ins_topic, results)
+    return Section("forecast", TITLE, lead, kept(parts), headline, claim=told, appendix=kept(workings))
 
 
 def short(method: str) -> str:

@@ -10,6 +10,7 @@ UnitState = Literal["good", "off", "one_of", "aided", "copy", "not_judged"]
 FaultKind = Literal["drift", "tilt", "step", "swapped_axis", "stuck", "frozen"]
 Verdict = Literal["agree", "off", "one_of", "not_judged"]
 UNIT_STATES: tuple[str, ...] = ("good", "off", "one_of", "aided", "copy", "not_judged")
+SAME_HEADING_DEG = 0.5  # between two records of one unit
 FAULT_KINDS: tuple[str, ...] = ("drift", "tilt", "step", "swapped_axis", "stuck", "frozen")
 VERDICTS: tuple[str, ...] = ("agree", "off", "one_of", "not_judged")
 
@@ -183,3 +184,17 @@ class UnitsResult(Answer):
     def unit(self, topic: str) -> InsUnit:
         """Return the unit of a topic."""
         return next(one for one in self.units if one.topic == topic)
+
+    def against_copy(self, unit: InsUnit) -> tuple[str, ...]:
+        """Return what speaks against a unit that repeats another being the same one, in words."""
+        if not unit.same_as:
+            return ()
+        both = {unit.topic, unit.same_as}
+        apart = next((one.heading_difference_deg for one in self.pairs if {one.first, one.second} == both), None)
+        found = []
+        if apart is not None and abs(apart) > SAME_HEADING_DEG:
+            found.append(f"its heading stands {abs(apart):.1f} deg apart")
+        serials = unit.serials, self.unit(unit.same_as).serials
+        if all(serials) and not set(serials[0]) & set(serials[1]):
+            found.append(f"it states another serial ({', '.join(serials[0])}, {', '.join(serials[1])})")
+        return tuple(found)

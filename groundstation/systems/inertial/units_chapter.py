@@ -76,6 +76,9 @@ def _remarks(answer: UnitsResult) -> list[Note]:
     for unit in answer.units:
         if len(unit.serials) > 1:
             notes.append(Note(f"{unit.topic}: the serial changes in flight, {' → '.join(unit.serials)}.", "warn"))
+        if yet := answer.against_copy(unit):
+            text = f"{unit.topic} repeats position and velocity of {unit.same_as}, yet {typeset(listed(yet))}"
+            notes.append(Note(f"{text}: see how the two were recorded.", "warn"))
     return notes
 
 
@@ -164,7 +167,8 @@ def _pairs(answer: UnitsResult) -> Grid:
 
 def _pair_state(pair: InsPair) -> Cell:
     if pair.why_not:
-        return Mark("unknown", pair.why_not[:1].upper() + pair.why_not[1:])
+        is_name = pair.why_not.startswith((pair.first, pair.second))
+        return Mark("unknown", pair.why_not if is_name else pair.why_not[:1].upper() + pair.why_not[1:])
     return Mark("warn", "Beyond") if pair.is_beyond else Mark("good", "Within")
 
 

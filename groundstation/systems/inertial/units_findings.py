@@ -34,7 +34,7 @@ def compare_units(flight: Flight, known: Known, settings: InertialSettings) -> t
     if found.is_common:
         findings.append(Finding("warn", "ins_units.common", COMMON, found.against, count=len(found.units)))
     for unit in found.units:
-        findings += _of_unit(unit, changes[unit.topic])
+        findings += _of_unit(unit, changes[unit.topic], found.against_copy(unit))
     return found, tuple(findings)
 
 
@@ -48,10 +48,12 @@ def _of_fault(fault: InsFault) -> Finding:
     return Finding("warn", f"ins_units.{fault.kind}", f"{who}{fault.text}, {fault.by}", topic, place)
 
 
-def _of_unit(unit: InsUnit, serials: tuple[tuple[float, str], ...]) -> list[Finding]:
+def _of_unit(unit: InsUnit, serials: tuple[tuple[float, str], ...], against_copy: tuple[str, ...]) -> list[Finding]:
     found = []
     if unit.same_as:
         text = f"it repeats {unit.same_as}: the same unit twice, counted once"
+        if against_copy:
+            text = f"it repeats position and velocity of {unit.same_as}, counted once; yet {listed(against_copy)}"
         found.append(Finding("warn", "ins_units.same", text, unit.topic))
     if unit.lag_s is not None and abs(unit.lag_s.value) > max(LATE_S, 1.5 * unit.lag_s.half95):
         late = "late" if unit.lag_s.value > 0.0 else "early"

@@ -72,7 +72,8 @@ def _claim(answer: Together) -> Claim:
     if any(log.remarks for log in others):
         mark = Mark("warn", mark.text)
     value = number(max(known), 3, "s") if known and len(known) == len(widths) else ""
-    return Claim(Rank.OTHER, mark, headline, value, "clocks of the logs agree, 95 %")
+    remark = "clocks of the logs agree, 95 %" if value else headline
+    return Claim(Rank.OTHER, mark, headline, value, remark)
 
 
 def _log_row(log: JoinedLog) -> tuple[str, ...]:

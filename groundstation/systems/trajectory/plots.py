@@ -94,7 +94,7 @@ def _rings(data: TrajectoryTrack, north: Floats, east: Floats, extent: float) ->
     if not len(rows):
         return (), 1
     sigmas = data.position_north_sigma_m[rows], data.position_east_sigma_m[rows]
-    larger = magnified(extent, float(np.median(np.maximum(*sigmas))) * ELLIPSE_95)
+    larger = magnified(extent, np.maximum(*sigmas) * ELLIPSE_95)
     middles = np.column_stack([north[rows], east[rows]])[:, None, :]
     drawn = middles + larger * outlines(*sigmas, np.zeros(len(rows)), ELLIPSE_95)
     return tuple(drawn), larger

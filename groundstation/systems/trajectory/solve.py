@@ -280,7 +280,7 @@ def _gates(
         judged_gate(
             settings.nis_doubt,
             f"nis_{row.sensor.replace(' ', '_').lower()}",
-            f"innovations of {row.sensor}, beside what is expected,",
+            f"innovations of {row.sensor} over those expected",
             row.ratio,
         )
         for row in innovations

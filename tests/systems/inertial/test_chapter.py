@@ -134,6 +134,8 @@ def test_of_an_aided_ins_the_differences_are_told_and_no_state() -> None:
 
 def test_reopening_and_other_ins_are_told() -> None:
     section = chapter(reopened=2, other_ins=("ins.1", "ins.2"))
+    assert section.lead.endswith("Of several INS, this is ins.") and "several" not in chapter().lead
+    assert chapter(**AIDED, other_ins=("ins.1",)).lead.endswith("Of several INS, this is ins.")
     assert not missing_in(notes(section)[1], "rejected GNSS", "opened again, 2 times", "INS class navigation")
     assert facts(section, FIGURES)["Pair used"][1] == "not used: ins.1, ins.2"
     assert facts(section, FIGURES)["Filter opened again"][0] == "2 times"

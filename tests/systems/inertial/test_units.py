@@ -9,10 +9,13 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.systems.inertial.study import units_limits as study
 from groundstation.systems.inertial.units import judge_units
 from groundstation.systems.inertial.units_answer import UnitsResult
+from groundstation.systems.inertial.units_chapter import units as chapter
 from groundstation.systems.inertial.units_growth import Noise, growth_of
 from groundstation.systems.inertial.units_limits import limits_of
 from groundstation.systems.inertial.units_log import serials_of
 from groundstation.systems.inertial.units_track import UnitTrack
+from tests.report_example import example
+from tests.section_contents import grid, notes, rows
 from tests.systems.inertial.units_example import (
     Change,
     Errors,
@@ -97,8 +100,26 @@ def test_a_unit_that_repeats_another_is_no_witness() -> None:
     twin = replace(made[0], topic="ins.2", time_s=made[0].time_s + 0.2)
     found = judge_units([*made, twin], None)
     assert found.unit("ins.2").same_as == "ins" and found.unit("ins.2").state == "copy"
+    assert not found.against_copy(found.unit("ins.2")) and not found.against_copy(found.unit("ins.1"))
     bad = units(2, bad=drift_of(0.3))
     assert judge_units([*bad, twin], None).verdict == "one_of"  # two votes of one unit do not outvote the other
+
+
+def test_what_speaks_against_a_copy_is_told() -> None:
+    first = replace(units(1)[0], serials=((0.0, "A1"),))
+    assert first.heading_deg is not None
+    twin = replace(first, topic="ins.1", serials=((0.0, "B2"),), heading_deg=(first.heading_deg + 4.0) % 360.0)
+    found = judge_units([first, twin], gnss())
+    assert found.unit("ins.1").state == "copy"
+    assert found.against_copy(found.unit("ins.1")) == (
+        "its heading stands 4.0 deg apart",
+        "it states another serial (B2, A1)",
+    )
+    section = chapter(example(found))
+    assert section is not None and "ins.1 repeats position and velocity of ins, yet its heading" in notes(section)[1]
+    assert rows(grid(section, "Pairs"))[0][1].text == "ins.1 repeats ins"
+    same = judge_units([first, replace(first, topic="ins.1")], gnss())
+    assert not same.against_copy(same.unit("ins.1"))
 
 
 def test_a_unit_that_gnss_corrects_is_never_the_good_one() -> None:

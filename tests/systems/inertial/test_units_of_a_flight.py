@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from groundstation.chapters.front import front
 from groundstation.chapters.parts import Mark
 from groundstation.pipeline.one_flight.analyse import known_of, run_analyses, seen_by_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.flight import sentence
 from groundstation.pipeline.one_flight.join import _metadata
 from groundstation.pipeline.verbs.acceptance import accept
 from groundstation.pipeline.verbs.usable import usability_of_flight
@@ -26,7 +28,7 @@ from groundstation.systems.inertial.units_plots import errors, pairs, radial
 from groundstation.systems.joining import name_in_flight
 from groundstation.tables.table import Flight
 from tests.acceptance_example import save_flight
-from tests.report_example import MANIFEST, example
+from tests.report_example import MANIFEST, example, heading_result
 from tests.section_contents import grid, notes, rows
 from tests.systems.inertial.flights import table_of
 from tests.systems.inertial.units_example import drift_of, gnss, stepped, units
@@ -72,6 +74,18 @@ def test_units_of_a_log_are_judged_and_named_by_their_serials() -> None:
     assert {"ins_units.drift", "ins_units.serial"} <= set(codes)
     assert UNITS.sentence({UNITS.name: answer}).startswith("ins.1 is off: ")
     assert UNITS.values({UNITS.name: answer})["units_off"] == "ins.1"
+
+
+def test_a_unit_that_is_off_stands_first_in_the_line_of_the_flight() -> None:
+    answer, _codes = answer_of(flight(3, bad=0.3))
+    assert answer is not None
+    results = example(heading_result())
+    with_it = replace(results, answers={**results.answers, **by_analysis(answer)})
+    before, after = sentence(results), sentence(with_it)
+    assert before.startswith("accept: heading error")
+    assert after == f"{answer.sentence}; {before}" and front(with_it, systems().chapters).subject == "Several INS"
+    agree = replace(with_it, answers={**with_it.answers, UNITS.name: replace(answer, verdict="one_of")})
+    assert sentence(agree).startswith("accept: heading error")
 
 
 def test_nothing_is_said_of_one_unit() -> None:
