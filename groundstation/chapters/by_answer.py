@@ -20,9 +20,8 @@ def answer_chapters(results: FlightResults, chapters: Chapters) -> tuple[Section
 def dangers(results: FlightResults, chapters: Chapters) -> frozenset[str]:
     """Return the names of the analyses whose chapters tell of a danger."""
     listed = [chapter for chapter in chapters.flight if any(map(results.answer, chapter.answers))]
-    claims = (
-        (one.name, section and section.claim) for one, section in zip(listed, _built(listed, results), strict=True)
-    )
+    sections = zip(listed, _built(listed, results), strict=True)
+    claims = ((one.name, section.claim) for one, section in sections if section is not None)
     return frozenset(name for name, claim in claims if claim is not None and claim.is_danger)
 
 

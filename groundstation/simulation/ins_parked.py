@@ -268,7 +268,7 @@ def _log(
     ahead, rng = len(path.time_s) - len(position_m), streams("output")
     noise = rng.standard_normal((len(path.time_s), 3))
     wrong = np.concatenate([np.repeat(position_m[:1], ahead, axis=0), position_m])
-    place = np.column_stack(displaced_deg(*path.place_deg.T, path.altitude_m, wrong))
+    place = np.column_stack(displaced_deg(path.place_deg[:, 0], path.place_deg[:, 1], path.altitude_m, wrong))
     velocity = path.velocity_mps + np.concatenate([np.zeros((ahead, 2)), velocity_mps])
     velocity = in_steps(velocity + output.velocity_noise_mps * noise[:, :2], output.velocity_step_mps)
     velocity[:ahead] = 0.0
@@ -299,7 +299,7 @@ def _log(
 
 def _gnss(settings: ParkedSettings, path: _Path, streams: Streams) -> dict[str, NDArray[np.generic]]:
     position, velocity = draw_gnss_errors(settings.gnss, len(path.time_s), 1.0, streams("gnss"))
-    latitude, longitude = displaced_deg(*path.place_deg.T, path.altitude_m, position)
+    latitude, longitude = displaced_deg(path.place_deg[:, 0], path.place_deg[:, 1], path.altitude_m, position)
     velocity = path.velocity_mps + velocity
     return {
         "latitude_deg": latitude,

@@ -347,13 +347,13 @@ def state_of(findings: tuple[Finding, ...], has_lost_data: bool, fail_on: str) -
 
 
 def sentence(results: FlightResults) -> str:
-    """Return the results of a flight in one line; what a report opens with as a danger stands first."""
+    """Return the results of a flight in one line, dangers first."""
     every = systems()
     told = ((one.name, attempt("line", one.name, one.sentence, results.answers)) for one in every.analyses)
     found = [(name, text) for name, text in told if text]
     if found:
-        first = dangers(results, every.chapters) if len(found) > 1 else frozenset()
-        return "; ".join(text for _name, text in sorted(found, key=lambda one: one[0] not in first))
+        ahead = dangers(results, every.chapters) if len(found) > 1 else frozenset()
+        return "; ".join(text for _name, text in sorted(found, key=lambda one: one[0] not in ahead))
     if not results.not_assessable:
         return recorded(results)
     first, *others = results.not_assessable

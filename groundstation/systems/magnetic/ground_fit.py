@@ -166,7 +166,7 @@ def curve(
 
 
 def whole_curve(fit: CurveFit, heading_deg: FloatArray, declination_sigma_deg: float) -> tuple[FloatArray, FloatArray]:
-    """Return the error and its sigma at magnetic headings, shapes (n,), however little is known."""
+    """Return the error and its sigma at magnetic headings, shapes (n,), known well or not."""
     columns = harmonics.design(heading_deg)
     covariance = with_declination(fit.covariance, declination_sigma_deg)
     sigma = np.sqrt(np.einsum("ni,ij,nj->n", columns, covariance, columns))

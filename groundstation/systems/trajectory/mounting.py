@@ -55,6 +55,7 @@ UNRELATED = "its motion is not that of GNSS: a unit of another vehicle, or of an
 MIRRORED = "its axes are left-handed: one is turned round, or two are swapped"
 REVERSED = "its accelerometers have the signs of gravity, not of specific force, or its axes and rates are left-handed"
 OTHER_AXES = "its gyros turn about other axes, or the other way, than its accelerometers show"
+NOT_SHOWN = "; this motion does not show the sign of every axis"
 IN_DEGREES = "its rates are degrees taken for radians: 57 times too large"
 IN_RADIANS = "its rates are radians taken for degrees: 57 times too small"
 
@@ -196,10 +197,13 @@ def find_mounting(
         mounting = _stated(mounting, stated, settings)
     elif logged is not None:
         mounting = _logged(mounting, logged, settings)
-    doubt = motion.doubt if isinstance(motion, _Motion) else ""
-    if not doubt or mounting.refused:
+    if mounting.refused or not isinstance(motion, _Motion):
         return mounting
-    return replace(mounting, doubt="; ".join(one for one in (mounting.doubt, f"maybe {doubt}") if one))
+    if motion.doubt:
+        return replace(mounting, doubt="; ".join(one for one in (mounting.doubt, f"maybe {motion.doubt}") if one))
+    if motion.evidence.margin < settings.margin_doubt:
+        return replace(mounting, words=mounting.words + NOT_SHOWN)
+    return mounting
 
 
 def _motion(imu: ImuIncrements, steps: Steps, settings: MountingSettings) -> _Motion | Mounting | MountingEvidence:

@@ -8,7 +8,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.units import MPS2_PER_G
 from groundstation.methods.ins_noise import GnssNoise, InsNoise, load_class
 from groundstation.simulation.channel_truth import RADIUS_M
-from groundstation.simulation.inertial_family import ErrorBatch, FamilySettings
+from groundstation.simulation.inertial_family import ORDINARY_RECEIVER, ErrorBatch, FamilySettings
 from groundstation.simulation.inertial_family import GnssErrorModel as SimulatedGnss
 from groundstation.simulation.ins_class import InsClass, load_ins_class
 from groundstation.simulation.routes import RouteKind
