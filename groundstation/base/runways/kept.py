@@ -57,6 +57,14 @@ def runways() -> RunwayTable:
     return _read(path, state.st_mtime_ns, state.st_size)
 
 
+def usable_runways() -> tuple[RunwayTable, str]:
+    """Return the table in use, and why it is not the user's where that one cannot be read."""
+    try:
+        return runways(), ""
+    except GroundstationError as error:
+        return shipped_runways(), str(error)
+
+
 def shipped_runways() -> RunwayTable:
     """Return the table that comes with groundstation."""
     return _read(SHIPPED, 0, 0)

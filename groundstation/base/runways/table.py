@@ -23,6 +23,7 @@ Texts = NDArray[np.str_]
 # Sigmas, judged by benchmarks/runways_against_published.py: thresholds of the table against published ones.
 SHIFT_SIGMA_M = 15.0  # of a whole runway, on each axis
 END_SIGMA_M = 10.0  # of one end beside the other
+ELEVATION_SIGMA_M = 5.0  # of a threshold: some rows have the airfield's elevation at both ends; not measured
 THRESHOLD_SIGMA_M = 70.0  # along the runway besides: displacements that are missing, or changed since
 AGREES_M = 30.0  # a length that is so near the distance between the ends confirms them
 LONGEST_M = 6_000.0  # of the runways there are
