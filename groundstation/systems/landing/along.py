@@ -87,7 +87,16 @@ def along_error(
     sigma_m = math.hypot(*(part.sigma_m for part in parts))
     interval_m = (error_m - LINEAR_95 * sigma_m, error_m + LINEAR_95 * sigma_m)
     return AlongError(
-        positions.topic, "measured", "", int(used.sum()), error_m, sigma_m, interval_m, 1.0 + share, parts
+        positions.topic,
+        "measured",
+        "",
+        int(used.sum()),
+        error_m,
+        sigma_m,
+        interval_m,
+        error_from_end_m=error_m + runway.displaced_m if runway.displaced_m else None,
+        scale=1.0 + share,
+        parts=parts,
     )
 
 
@@ -131,7 +140,7 @@ def _distance_of(positions: Positions, runway: RunwayUsed) -> FloatArray:
 def _at_the_threshold(
     distance_m: FloatArray, apart_m: FloatArray, settings: LandingSettings
 ) -> tuple[float, float, float]:
-    """Return the difference continued to the threshold, its sigma, and its share of the distance.
+    """Continue the difference to the threshold: value, sigma, and share of the distance.
 
     The share has a prior of mean zero.
     """

@@ -178,6 +178,9 @@ class AlongError:
     error_m, sigma_m : float or None
         Position minus what height and glide path say, forward positive, as the threshold is crossed.
     confidence95_m : (float, float) or None
+    error_from_end_m : float or None
+        The same if the threshold were not displaced: it may not have been when the log was recorded. None where the
+        runway has no displaced threshold.
     scale : float or None
         Distances by the glide path over those by the positions; 1 where angle and height are as taken.
     """
@@ -189,6 +192,7 @@ class AlongError:
     error_m: float | None = None
     sigma_m: float | None = None
     confidence95_m: tuple[float, float] | None = None
+    error_from_end_m: float | None = None
     scale: float | None = None
     parts: tuple[ErrorPart, ...] = ()
 

@@ -42,7 +42,7 @@ class ChosenRunway:
 
 @dataclass(frozen=True)
 class EndOfApproach:
-    """Place, course and height in which an approach ended, and the scale of the error of its positions.
+    """Place, course and height in which an approach ended, and the scale of its errors.
 
     ``height_m`` is None on the ground.
     """
@@ -133,7 +133,7 @@ def _before_threshold_m(end: EndOfApproach, settings: LandingSettings) -> float:
 def _weighed(
     end: EndOfApproach, one: RunwayDirection, before_m: float, settings: LandingSettings
 ) -> tuple[float, RunwayDirection, tuple[float, float]] | None:
-    """Return the density of an end for a runway, its place behind the threshold and right of the centre line.
+    """Return the density of an end for a runway, and its place there: behind, right.
 
     None where it lies too far aside.
     """
