@@ -16,7 +16,7 @@ from groundstation.base.errors import UsageError
 from groundstation.base.garbage import importing
 from groundstation.base.version import __version__
 from groundstation.base.without_pandas import spare_pandas
-from groundstation.cli import fleets, flights, plans, profiles, rules, simulated, single_logs, watching
+from groundstation.cli import fleets, flights, plans, profiles, rules, runways, simulated, single_logs, watching
 from groundstation.cli.application import (
     DONE,
     INTERRUPTED,
@@ -56,7 +56,19 @@ from groundstation.cli.application import (
 )
 
 # the modules hold more verbs
-__all__ = ["app", "fleets", "flights", "main", "plans", "profiles", "rules", "simulated", "single_logs", "watching"]
+__all__ = [
+    "app",
+    "fleets",
+    "flights",
+    "main",
+    "plans",
+    "profiles",
+    "rules",
+    "runways",
+    "simulated",
+    "single_logs",
+    "watching",
+]
 
 
 DRAWING = frozenset(("run", "watch", "report", "view", "compare", "cooperative"))  # verbs that write recordings
