@@ -8,6 +8,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.errors import NotAssessableError
+from groundstation.base.geodesy import displaced_deg
 from groundstation.simulation.ins_units.family import (
     BAD_INPUTS,
     BROKEN,
@@ -28,9 +29,11 @@ from groundstation.simulation.ins_units.settings import (
     UnitsSettings,
     UnitStep,
 )
+from groundstation.simulation.ins_units.unit_faults import UnitErrors
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.units import judge_units
 from groundstation.systems.inertial.units_answer import InsFault, InsUnit, Measured, UnitsResult
+from groundstation.systems.inertial.units_grid import OnGrid, apart_m
 from groundstation.systems.inertial.units_growth import growth_of
 from groundstation.systems.inertial.units_log import unit_class, unit_reference, unit_tracks
 from groundstation.systems.inertial.units_track import ReferenceTrack, UnitTrack
@@ -346,7 +349,8 @@ def _pair_cells(flight: UnitsFlight, answer: UnitsResult) -> list[CellError]:
     found: list[CellError] = []
     for pair in answer.pairs:
         first, second = units[pair.first], units[pair.second]
-        apart, velocity = second.position_m - first.position_m, second.velocity_mps - first.velocity_mps
+        apart = apart_m(_exactly(flight, second), _exactly(flight, first))
+        velocity = second.velocity_mps - first.velocity_mps
         true = growth_of(flight.time_s, apart, velocity, from_first=not pair.is_start_known)
         heading = float(np.median(np.rad2deg(second.azimuth_rad - first.azimuth_rad)))
         truths = {name: size_of(true, of) for name, of in zip(QUANTITIES, GROWTHS, strict=True)}
@@ -356,6 +360,15 @@ def _pair_cells(flight: UnitsFlight, answer: UnitsResult) -> list[CellError]:
             if value is not None and truth is not None:
                 found.append(CellError(f"pair {name}", value.value - truth.value, value.half95))
     return found
+
+
+def _exactly(flight: UnitsFlight, errors: UnitErrors) -> OnGrid:
+    """Return the track of a unit without noise and rounding."""
+    motion = flight.truth.motion
+    places = motion.latitude_deg[0], flight.truth.longitude_deg
+    latitude, longitude = displaced_deg(*places, motion.altitude_m[0], errors.position_m)
+    heading = motion.heading_deg[0] + np.rad2deg(errors.azimuth_rad)
+    return OnGrid(flight.time_s, latitude, longitude, motion.altitude_m[0], errors.velocity_mps, heading)
 
 
 def _difference(name: str, unit: InsUnit, truth: InsUnit) -> list[CellError]:
