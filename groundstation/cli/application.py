@@ -25,7 +25,7 @@ DONE, FAILED, USAGE, DATA_LOST, LIMIT_REACHED = 0, 1, 2, 3, 4
 INTERRUPTED = 130
 EXIT_CODES = (
     "Exit codes: 0 done; 1 could not read or compute; 2 usage; 3 done, with data lost (truncated, corrupt spans, "
-    "channels dropped); 4 done, and --fail-on reached. For several logs the worst wins (1, 4, 3, 0)."
+    "channels dropped); 4 done, and --fail-on reached; 130 interrupted. For several logs the worst wins (1, 4, 3, 0)."
 )
 
 VERBS = (
