@@ -16,7 +16,11 @@ from groundstation.base.signals import Field, field_of
 from groundstation.base.units import CONVERSIONS
 from groundstation.readers.flightdata_hdf5.container import Container, Parameter
 
-_UNITS: Mapping[str, str] = {"kts": "kt", "deg/sec": "dps", "%": "percent"}  # units as these files write them -> as base.units does
+_UNITS: Mapping[str, str] = {
+    "kts": "kt",
+    "deg/sec": "dps",
+    "%": "percent",
+}  # units as these files write them -> as base.units does
 Way = Literal["plain", "circle", "step"]
 
 

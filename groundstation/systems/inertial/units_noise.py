@@ -54,7 +54,7 @@ def _step(values: FloatArray, smallest: float = SMALLEST_DEG) -> float:
 
 
 def _rounding(steps: list[float]) -> float:
-    return float(np.hypot(*steps) / np.sqrt(12.0))
+    return float(np.linalg.norm(steps) / np.sqrt(12.0))
 
 
 def _white(values: FloatArray) -> float:
