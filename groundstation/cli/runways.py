@@ -55,7 +55,7 @@ def show(
     verbose: Verbose = False,
     json: Json = False,
 ) -> int | None:
-    """Show the runways of an airport; without a name, the table itself: version, licence, rows left out."""
+    """Show the runways of an airport; without a name version and licence of the table."""
     from groundstation.base.serial import to_json
     from groundstation.cli.text import as_json
     from groundstation.pipeline.verbs.runways import runways_of, table_in_use
@@ -125,7 +125,7 @@ def table_text(table: "TableInUse") -> str:
 
 
 def runways_text(found: "FoundRunways", *, everything: bool = False) -> str:
-    """Return the table of runways found; with ``everything`` the sigmas and places of the ends too."""
+    """Return the table of runways found, with ``everything`` the ends too."""
     from groundstation.base.text_columns import columns
 
     if not found.found:
