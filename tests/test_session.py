@@ -134,7 +134,7 @@ def test_a_finished_session_is_not_run_again(
     assert page.read_bytes() == (out / IDENTITY / "report.html").read_bytes()
     (told,) = json.loads(capsys.readouterr().out)
     assert (told["state"], told["flight_id"]) == ("done", IDENTITY)
-    assert "3 aircraft, centralised: 2 sigma_r" in told["text"]
+    assert "3 aircraft, smoothed: 2 sigma_r" in told["text"]
 
 
 def test_a_finished_session_gets_its_pdf_and_keeps_it(
@@ -385,7 +385,7 @@ def test_the_recording_has_both_timelines_and_every_aircraft(contents: Contents)
 def test_ellipsoids_are_those_of_two_sigma(contents: Contents, results: FlightResults) -> None:
     tracks = results.figure_with_rows("cooperative_tracks")
     assert tracks is not None
-    rows = (tracks["algorithm"] == "centralised") & (tracks["vehicle"] == "B")
+    rows = (tracks["algorithm"] == "smoothed") & (tracks["vehicle"] == "B")
     reckoned = tracks["sigma_up_m"][tracks["algorithm"] == "dead_reckoning"]
     assert reckoned == pytest.approx(SHORT.errors.baro_m, rel=0.01), "the barometer's alone"
     (batch,) = contents.batches["/space/B/ellipsoid"]

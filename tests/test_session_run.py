@@ -214,7 +214,7 @@ def test_a_second_run_does_nothing_and_the_lines_are_the_same(
     told = capsys.readouterr()
     (session,) = [entry for entry in json.loads(told.out) if entry.get("kind") == "session"]
     assert (session["state"], session["flight_id"], session["exit_code"]) == ("done", IDENTITY, 0)
-    assert session["text"].startswith("3 aircraft, centralised: 2 sigma_r")
+    assert session["text"].startswith("3 aircraft, smoothed: 2 sigma_r")
     events = [json.loads(line) for line in told.err.splitlines() if line.startswith("{")]
     assert [event["total"] for event in events if event["event"] == "begin"] == [3, 4]
     assert events[-1]["event"] == "end" and events[-1]["text"] == session["text"]
@@ -468,11 +468,11 @@ def test_the_fleet_lists_the_session_with_its_report(out: Path) -> None:
     answer = results_in(out / IDENTITY).answer(CooperativeResult)
     assert answer is not None
     (row,) = fleet.sessions
-    centralised, reckoned = (
-        next(one for one in answer.algorithms if one.algorithm == name) for name in ("centralised", "dead_reckoning")
+    smoothed, reckoned = (
+        next(one for one in answer.algorithms if one.algorithm == name) for name in ("smoothed", "dead_reckoning")
     )
-    assert (row.session_id, row.aircraft, row.algorithm) == (IDENTITY, "A, B, C", "centralised")
-    assert (row.two_sigma_r_m, row.rms_m) == (centralised.two_sigma_r_m, centralised.rms_m)
+    assert (row.session_id, row.aircraft, row.algorithm) == (IDENTITY, "A, B, C", "smoothed")
+    assert (row.two_sigma_r_m, row.rms_m) == (smoothed.two_sigma_r_m, smoothed.rms_m)
     assert row.reckoned_two_sigma_r_m == reckoned.two_sigma_r_m
     assert len(fleet) == 3
     page = (out / "summary.html").read_text(encoding="utf-8")

@@ -92,7 +92,7 @@ def test_the_curves_of_a_comparison_are_those_of_the_tracks(session: Path) -> No
     saved = load(session)
     curves, tracks = session_errors(saved), saved.figure("cooperative_tracks")
     assert curves is not None and tracks is not None
-    last = (tracks["algorithm"] == "centralised") & (tracks["time_s"] == tracks["time_s"].max())
+    last = (tracks["algorithm"] == "smoothed") & (tracks["time_s"] == tracks["time_s"].max())
     assert last.sum() == 3
     assert curves["two_sigma_r_m"][-1] == tracks["two_sigma_r_m"][last].max()
     assert curves["rms_error_m"][-1] == pytest.approx(np.sqrt(np.mean(tracks["error_m"][last] ** 2)))

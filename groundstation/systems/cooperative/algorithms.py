@@ -8,6 +8,7 @@ from groundstation.systems.cooperative.decentralised import run_decentralised
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.pairwise import run_pairwise
 from groundstation.systems.cooperative.settings import ALGORITHMS, CooperativeSettings
+from groundstation.systems.cooperative.smoother.smoothed import run_smoothed
 from groundstation.systems.cooperative.tracks import AlgorithmRun
 
 WORTH_COMPILING = 50_000  # measurements; plain filters take some ten seconds for so many
@@ -34,7 +35,8 @@ def run_algorithm(
     settings : CooperativeSettings
     algorithm : str
     innovates : bool
-        False (the centralised filter alone): measurements shrink the covariance and leave the state where it is.
+        False (the centralised filter and the smoother alone): measurements shrink the covariance and leave the state
+        where it is.
     is_repeated : bool
         Whether this is one run of many.
 
@@ -49,6 +51,8 @@ def run_algorithm(
     if algorithm in ("dead_reckoning", "centralised"):
         run = run_centralised if is_compiled else plain.run_centralised
         return run(prepared, settings, uses_measurements=algorithm == "centralised", innovates=innovates)
+    if algorithm == "smoothed":
+        return run_smoothed(prepared, settings, innovates=innovates)
     if algorithm == "pairwise":
         return (run_pairwise if is_compiled else plain.run_pairwise)(prepared, settings)
     return (run_decentralised if is_compiled else plain.run_decentralised)(prepared, settings, algorithm)

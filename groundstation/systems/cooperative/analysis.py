@@ -43,7 +43,7 @@ def _examine(session: "Session", _known: SessionKnown, settings: CooperativeSett
 def innovations_of(answer: CooperativeResult) -> dict[str, float]:
     """Return the mean normalised innovation squared by kind of range; 1 is right.
 
-    It is that of the default algorithm.
+    It is that of the centralised filter, which predicts a range before it uses it.
     """
     kinds = dict.fromkeys(link.kind for link in answer.links)
     found: dict[str, float] = {}
@@ -71,7 +71,7 @@ def _too_sure(answer: CooperativeResult) -> tuple[Finding, ...]:
 
 
 def _misplaced(answer: CooperativeResult) -> tuple[Finding, ...]:
-    """Warn of a station whose ranges the default algorithm gates while it uses the others.
+    """Warn of a station whose ranges the centralised filter gates while it uses the others.
 
     With honest sigmas one range in 10^8 or fewer is beyond a gate of 6 sigma.
     """
@@ -83,7 +83,7 @@ def _misplaced(answer: CooperativeResult) -> tuple[Finding, ...]:
         others, others_gated = sum(link.ranges for link in rest), sum(link.gated for link in rest)
         if ranges >= LEAST_OF_A_STATION and gated > GATED_SHARE * ranges and others_gated < OTHERS_SHARE * others:
             text = (
-                f"{answer.default_algorithm} rejected {gated} of {ranges} ranges to station {name} and hardly any "
+                f"{answer.links_algorithm} rejected {gated} of {ranges} ranges to station {name} and hardly any "
                 "other: its place in the stations file contradicts the ranges"
             )
             found.append(Finding("warn", "cooperative.misplaced_station", text, f"link.{name}", name, gated))

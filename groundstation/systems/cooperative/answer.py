@@ -18,9 +18,9 @@ class AlgorithmRow:
     ----------
     algorithm : str
         ``dead_reckoning``, ``centralised``, ``neighbour_exact``, ``ranked``, ``modified``, ``split_intersection``,
-        ``pairwise``.
+        ``pairwise``, ``smoothed``.
     update : str
-        ``sequential`` or ``simultaneous``.
+        ``sequential`` or ``simultaneous``; ``batch`` of the smoother.
     two_sigma_r_m : float
         Twice the computed sigma_r = sqrt(sx^2 + sy^2) at the end, worst vehicle.
     rms_m : float or None
@@ -29,7 +29,8 @@ class AlgorithmRow:
         Mean normalised squared horizontal error (2 is honest) and its 95 % limits from the number of independent
         vehicles alone: errors of one vehicle at neighbouring epochs are not independent.
     bound_ratio : float or None
-        RMS error over the Cramer-Rao bound (of the same session, best centralised filter).
+        RMS error over the Cramer-Rao bound of the same session: that of what was known until then, for ``smoothed``
+        that of the whole session.
     spectral_radius : float or None
         Spectral radius of the joint error map of the decentralised filters, per window, worst window: above 1 errors
         feed themselves.
@@ -104,7 +105,7 @@ class GeometryRow:
 
 @dataclass(frozen=True)
 class LinkRow:
-    """One direction of one link: measurements and residuals of the best algorithm."""
+    """One direction of one link: measurements, residuals of ``links_algorithm``."""
 
     receiver: str
     source: str
@@ -126,9 +127,13 @@ class CooperativeResult(SessionAnswer):
     frame : str
         ``ecef`` or ``local``.
     default_algorithm : str
-        The one whose positions are to be used.
+        The one whose positions are to be used: ``smoothed``, which uses the whole session; the others tell what was
+        knowable on board.
     algorithms, vehicles, geometry, links
         Tables; see the rows.
+    links_algorithm : str
+        Whose predictions the residuals of ``links`` are against: the centralised filter, which has not used a range
+        before it predicts it.
     vehicle_names, point_names : tuple of str
     duration_s : float
     slots : int
@@ -150,6 +155,7 @@ class CooperativeResult(SessionAnswer):
     vehicles: tuple[VehicleRow, ...]
     geometry: tuple[GeometryRow, ...] = ()
     links: tuple[LinkRow, ...] = ()
+    links_algorithm: str = "centralised"
     vehicle_names: tuple[str, ...] = ()
     point_names: tuple[str, ...] = ()
     duration_s: float = 0.0

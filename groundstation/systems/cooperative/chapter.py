@@ -26,8 +26,9 @@ from groundstation.systems.cooperative.answer import AlgorithmRow, CooperativeRe
 
 TITLE = "Navigation between aircraft"
 LEAD = (
-    "Positions of all aircraft from their own dead reckoning and the ranges between them, by every algorithm; 2σ_r is "
-    "twice the root of the summed variances north and east, as the filter computes it."
+    "Positions of all aircraft from their own dead reckoning and the ranges between them. The smoothed answer uses all "
+    "readings of the session at every time; the filters beside it tell what was knowable on board. 2σ_r is twice the "
+    "root of the summed variances north and east, as each algorithm computes it."
 )
 TITLES: Mapping[str, str] = {
     "dead_reckoning": "Dead reckoning alone",
@@ -37,6 +38,7 @@ TITLES: Mapping[str, str] = {
     "modified": "Ranked, noise of the primaries correlated",
     "split_intersection": "Split covariance intersection",
     "pairwise": "Stored pairwise covariances",
+    "smoothed": "Smoothed: the whole session at once",
 }
 REFERENCE = "dead_reckoning"
 MOST_LINKS = 40
@@ -54,7 +56,8 @@ COST_CAPTION = (
 )
 ALGORITHM_CAPTION = (
     "NEES: squared error over its computed variance, 2 is honest; the limits count aircraft, not epochs. Diverges: "
-    "error above three computed σ_r at the end. The bound is that of Cramér and Rao for this geometry."
+    "error above three computed σ_r at the end. The bound is that of Cramér and Rao for this geometry, from the "
+    "readings that the algorithm may use."
 )
 VEHICLE_HEADS = (
     *(Head("Aircraft"), Head("σ north, m", True), Head("σ east, m", True), Head("2σ_r, m", True)),
@@ -162,7 +165,13 @@ def session_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -
         limits = f"NEES {number(best.nees, 2)}, 95 % limits {number(best.nees_low, 2)} to {number(best.nees_high, 2)}"
         figures.append(("RMS error", number(best.rms_m, 1, "m"), limits))
         figures.append(("Over the bound", number(best.bound_ratio, 2), "RMS error over that of Cramér and Rao"))
-    figures.append(("Data link", number(best.bytes_per_slot, 0, "bytes"), "per slot, for this algorithm"))
+    on_board = _row(answer, answer.links_algorithm)
+    if on_board is not None and on_board is not best:
+        figures.append(
+            ("Knowable on board", number(on_board.two_sigma_r_m, 1, "m"), f"2σ_r, {title_of(on_board.algorithm)}")
+        )
+    if best.messages:
+        figures.append(("Data link", number(best.bytes_per_slot, 0, "bytes"), "per slot, for this algorithm"))
     return Front(
         f"Session of {names_or_count(answer.vehicle_names)}",
         pairs,
@@ -310,8 +319,8 @@ def _links(answer: CooperativeResult) -> Grid | None:
         for row in ordered[:MOST_LINKS]
     ]
     caption = (
-        "Residuals of the default algorithm, worst first; NIS: squared residual over its computed variance, 1 is "
-        "honest."
+        f"Residuals of the ranges as predicted by {title_of(answer.links_algorithm)}, worst first; NIS: squared "
+        "residual over its computed variance, 1 is honest."
     )
     if len(ordered) > len(rows):
         caption += f" {len(ordered) - len(rows)} more in summary.json."

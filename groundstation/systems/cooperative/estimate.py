@@ -21,7 +21,7 @@ from groundstation.systems.cooperative.tracks import AlgorithmRun, VehicleTrack
 from groundstation.tables.session import Session
 
 SELDOM_GATED = 0.2
-DEFAULT = "centralised"
+DEFAULT, KNOWN_ON_BOARD = "smoothed", "centralised"
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def estimate_session(
     session : Session
     settings : CooperativeSettings
     algorithms : sequence of str
-        Names of ``settings.ALGORITHMS``; the first that is ``centralised`` or pairwise is the default answer.
+        Names of ``settings.ALGORITHMS``; ``smoothed`` is the default answer, without it the last.
     truth : dict of vehicle to (time_s (m,), position_m (m, 3)), optional
         In the frame of the session; only judges.
 
@@ -74,8 +74,10 @@ def estimate_session(
             checks[name] = check_pairwise(prepared, settings, _reference_tracks(judged))
         if name not in checks or not checks[name].refused:
             judged.append(_judged(prepared, run_algorithm(prepared, settings, name), truth))
-    default = next((one for one in judged if one.run.algorithm == DEFAULT), judged[-1])
+    default = _run_of(judged, DEFAULT)
+    predicting = _run_of(judged, KNOWN_ON_BOARD).run
     bound = bound_of(prepared.session, settings, truth)
+    smoothing_bound = bound_of(prepared.session, settings, truth, DEFAULT) if DEFAULT in algorithms else bound
     geometry = geometry_of(prepared.session, settings, default.run)
     findings = [*prepared.findings, *_findings(judged, settings), *refusals(checks)]
     slots = len(np.unique(prepared.events.slot[np.isin(prepared.events.kind, (PEER, POINT))]))
@@ -83,10 +85,18 @@ def estimate_session(
     answer = CooperativeResult(
         frame=session.frame,
         default_algorithm=default.run.algorithm,
-        algorithms=with_checks([_algorithm_row(prepared, one, bound, slots) for one in judged], checks, algorithms),
+        algorithms=with_checks(
+            [
+                _algorithm_row(prepared, one, smoothing_bound if one.run.algorithm == DEFAULT else bound, slots)
+                for one in judged
+            ],
+            checks,
+            algorithms,
+        ),
         vehicles=tuple(row for one in judged for row in _vehicle_rows(prepared, one)),
         geometry=tuple(_geometry_row(one) for one in geometry),
-        links=_link_rows(prepared, default.run),
+        links=_link_rows(prepared, predicting),
+        links_algorithm=predicting.algorithm,
         vehicle_names=prepared.session.names,
         point_names=tuple(point.name for point in session.points),
         duration_s=float(last - min(vehicle.first_s for vehicle in prepared.vehicles)),
@@ -96,7 +106,7 @@ def estimate_session(
             figures.tracks_figure([(one.run, one.judgements) for one in judged]),
             figures.geometry_figure(geometry, bound),
             figures.map_figure([one.run for one in judged]),
-            figures.links_figure(prepared, default.run),
+            figures.links_figure(prepared, predicting),
             figures.traffic_figure([one.run for one in judged]),
         ),
     )
@@ -104,8 +114,12 @@ def estimate_session(
 
 
 def _reference_tracks(judged: Sequence[JudgedRun]) -> tuple[VehicleTrack, ...]:
-    """Return the tracks of the default algorithm, about which others are examined."""
-    return next((one for one in judged if one.run.algorithm == DEFAULT), judged[0]).run.tracks
+    """Return the tracks of the centralised filter, about which others are examined."""
+    return next((one for one in judged if one.run.algorithm == KNOWN_ON_BOARD), judged[0]).run.tracks
+
+
+def _run_of(judged: Sequence[JudgedRun], algorithm: str) -> JudgedRun:
+    return next((one for one in judged if one.run.algorithm == algorithm), judged[-1])
 
 
 @np.errstate(over="ignore", invalid="ignore")

@@ -144,8 +144,12 @@ def _position_at(track: VehicleTrack, time_s: float) -> FloatArray:
 Truth = dict[str, tuple[FloatArray, FloatArray]]
 
 
-def bound_of(session: Session, settings: CooperativeSettings, truth: Truth) -> AlgorithmRun:
+def bound_of(
+    session: Session, settings: CooperativeSettings, truth: Truth, algorithm: str = "centralised"
+) -> AlgorithmRun:
     """Run the centralised filter along the true tracks; its covariance is the bound.
+
+    That of an answer from the whole session is the smoother's.
 
     No reading has an error. Vehicles without truth keep their own dead reckoning; then the bound is one along the
     tracks as they were read. Measured values have no say in it: innovations far from zero only move the point of
@@ -160,5 +164,6 @@ def bound_of(session: Session, settings: CooperativeSettings, truth: Truth) -> A
         vehicles.append(vehicle)
     along = replace(session, vehicles=tuple(vehicles))
     prepared = prepare(along, settings)
-    exact = replace(settings, gate_sigma=0.0)
-    return run_algorithm(prepared, exact, "centralised", innovates=False)
+    smoother = replace(settings.smoother, robust_sigmas=0.0)
+    exact = replace(settings, gate_sigma=0.0, smoother=smoother)
+    return run_algorithm(prepared, exact, algorithm, innovates=False)

@@ -247,7 +247,7 @@ def links(results: FlightResults) -> Plot | None:
         "cooperative.links",
         "Residuals of the links",
         "Residuals of the ranges over their computed sigma, "
-        f"{title_of(answer.default_algorithm)}{'' if is_crowd else ', by receiver'}; values beyond "
+        f"{title_of(answer.links_algorithm)}{'' if is_crowd else ', by receiver'}; values beyond "
         f"{ceiling:.0f} are drawn at the edge.",
         "Residuals of the ranges with time.",
         one_panel(Panel(marks, time_axis(float(time.min()), float(time.max())), y), 44.0),

@@ -14,6 +14,7 @@ ALGORITHMS: dict[str, str] = {
     "modified": "ranked, correlated noise of the primaries",
     "split_intersection": "own states, split covariance intersection",
     "pairwise": "own states and stored pairwise cross-covariances (Luft et al.)",
+    "smoothed": "batch least squares over all vehicles and the whole session",
 }
 
 
@@ -91,6 +92,31 @@ class CameraBelief:
 
 
 @dataclass(frozen=True)
+class SmootherSettings:
+    """Settings of the smoother alone.
+
+    Parameters
+    ----------
+    robust_sigmas : float
+        Scale of Cauchy's weights, in sigmas of one reading; 0: all weigh alike.
+    correlated_share : float
+        Share of the variance of link ranges and bearings that stays while a pair measures again, where the residuals
+        are too few to tell. ``CooperativeSettings.correlated_share`` above 0 is taken as it is, for the filters too.
+    pair_bias_m : float
+        Sigma of a constant bias of the ranges of each pair of vehicles; 0: no such states.
+    most_passes : int
+    """
+
+    robust_sigmas: float = number(2.385, 0.0, 100.0)
+    correlated_share: float = number(0.5, 0.0, 0.95)
+    pair_bias_m: float = number(0.0, 0.0)
+    most_passes: int = number(30, 1, 1000)
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+@dataclass(frozen=True)
 class CooperativeSettings:
     """Settings of the cooperative filters.
 
@@ -146,6 +172,7 @@ class CooperativeSettings:
     ins: InsBelief = field(default_factory=InsBelief)
     odometry: OdometryBelief = field(default_factory=OdometryBelief)
     camera: CameraBelief = field(default_factory=CameraBelief)
+    smoother: SmootherSettings = field(default_factory=SmootherSettings)
 
     def __post_init__(self) -> None:
         check_ranges(self)

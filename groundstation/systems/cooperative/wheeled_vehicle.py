@@ -55,8 +55,8 @@ class WheeledVehicle:
         self._at = {name: number for number, name in enumerate(self.states)}
         self.bias = self._at.get("range_bias_m", -1)
         self._sigma = np.array([sigma for sigma, _ in believed.values()])
-        self._unread = _squares(track)
-        self._density = np.array([2.0 * sigma**2 / time_s for sigma, time_s in believed.values()])
+        self.unread = _squares(track)
+        self.density = np.array([2.0 * sigma**2 / time_s for sigma, time_s in believed.values()])
 
     @property
     def size(self) -> int:
@@ -106,7 +106,7 @@ class WheeledVehicle:
         noise = self._noise(speed != 0.0 or turn != 0.0, way, abs(step_s), cosine, sine)
         gap_s = float(self._track.gap_s[epoch]) if len(self._track.gap_s) else 0.0
         if gap_s > 0.0:  # an error as large as the motion itself, the same for the whole gap
-            noise[[0, 1, 2], [0, 1, 2]] += np.array(self._unread)[[0, 0, 1]] * gap_s * abs(step_s)
+            noise[[0, 1, 2], [0, 1, 2]] += np.array(self.unread)[[0, 0, 1]] * gap_s * abs(step_s)
         return moved, phi, noise
 
     def _noise(self, is_moving: bool, way: float, step_s: float, cosine: float, sine: float) -> FloatArray:
@@ -120,7 +120,7 @@ class WheeledVehicle:
             q[0, 1] = q[1, 0] = (along - across) * sine * cosine
             q[2, 2] = np.deg2rad(belief.turn_deg_per_sqrt_s) ** 2 * step_s
         errors = np.arange(3, self.size)
-        q[errors, errors] = self._density * step_s
+        q[errors, errors] = self.density * step_s
         return q
 
     def _readings(self, epoch: int) -> tuple[float, float]:
