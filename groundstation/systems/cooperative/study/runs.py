@@ -22,7 +22,6 @@ from groundstation.systems.cooperative.study.cases import PublishedCase, setting
 
 Progress = Callable[[str], None]
 WORKERS = 2
-MANY_RUNS = 20  # from which on compiling the filters pays
 
 
 @dataclass(frozen=True)
@@ -72,8 +71,7 @@ def run_cases(
     Cases of one session see the same flights, whatever the number of workers.
     """
     outcomes: dict[str, tuple[CaseRun, ...]] = {}
-    is_repeated = runs >= MANY_RUNS
-    jobs = [(case, seed, run, is_repeated) for case in cases for run in range(runs)]
+    jobs = [(case, seed, run) for case in cases for run in range(runs)]
     if workers <= 1 or len(jobs) < 8:
         found = [fly(*job) for job in jobs]
         for at, case in enumerate(cases):
@@ -89,16 +87,16 @@ def run_cases(
     return outcomes
 
 
-def fly(case: PublishedCase, seed: int, run: int, is_repeated: bool) -> CaseRun:
+def fly(case: PublishedCase, seed: int, run: int) -> CaseRun:
     """Simulate and filter one run of a case."""
     scenario = load_session(case.session)
     settings = settings_of(scenario, case)
     simulated = simulate_session(scenario, seed, run)
     prepared = prepare(simulated.session, settings)
-    done = run_algorithm(prepared, settings, case.algorithm, is_repeated=is_repeated)
+    done = run_algorithm(prepared, settings, case.algorithm)
     other = done
     if case.metric == "gain_over_ins":
-        other = run_algorithm(prepared, settings, case.against, is_repeated=is_repeated)
+        other = run_algorithm(prepared, settings, case.against)
     who = simulated.session.names.index(case.aircraft)
     errors = []
     for track, truth in zip(done.tracks, simulated.truth, strict=True):
