@@ -95,7 +95,7 @@ def _sentence(answers: Answers) -> str:
     if answer is None:
         return ""
     rows = [row for row in answer.algorithms if row.algorithm == answer.default_algorithm]
-    if not rows:
+    if not rows or rows[0].two_sigma_r_m is None:
         return ""
     against = "" if rows[0].rms_m is None else f", {rows[0].rms_m:.1f} m RMS against the truth"
     who = f"{len(answer.vehicle_names)} aircraft" if len(answer.vehicle_names) > 1 else answer.vehicle_names[0]

@@ -41,11 +41,15 @@ class AlgorithmRow:
         Measurements used, rejected by the gate, and not usable (nobody broadcast, unknown position).
     messages, bytes_per_slot : float
         Traffic that a data link would carry for this algorithm, mean over slots.
+    expected_nees : float or None
+        NEES to expect from geometry and stated sigmas alone, worst time, where it was worked out (``pairwise``).
+    refused : str
+        Why this algorithm was not run; empty where it was. All figures of a refused one are None or 0.
     """
 
     algorithm: str
     update: str
-    two_sigma_r_m: float
+    two_sigma_r_m: float | None
     rms_m: float | None
     nees: float | None
     nees_low: float | None
@@ -59,6 +63,8 @@ class AlgorithmRow:
     lost: int
     messages: int
     bytes_per_slot: float
+    expected_nees: float | None = None
+    refused: str = ""
 
 
 @dataclass(frozen=True)

@@ -106,7 +106,8 @@ def trusted(answer: CooperativeResult) -> AlgorithmRow:
     make, the one with the least error, where there is any. One session is too little to choose by its error alone. Dead
     reckoning only where nothing else ran.
     """
-    ran = [row for row in answer.algorithms if row.algorithm != REFERENCE] or list(answer.algorithms)
+    able = [row for row in answer.algorithms if not row.refused]
+    ran = [row for row in able if row.algorithm != REFERENCE] or able
     default = next((row for row in ran if row.algorithm == answer.default_algorithm), ran[0])
     sound = [row for row in ran if _is_safe(row)]
     if default in sound or not sound:
@@ -214,16 +215,17 @@ def _algorithms(answer: CooperativeResult, best: AlgorithmRow) -> Grid:
         rows.append(
             (
                 Mark("good" if row is best else "plain", title_of(row.algorithm)),
-                row.update,
+                "refused" if row.refused else row.update,
                 number(row.two_sigma_r_m, 1),
                 number(row.rms_m, 1),
                 number(row.bound_ratio, 2),
                 number(row.nees, 2) + limits,
-                _yes_no(row.is_consistent, is_good=True),
-                _yes_no(row.diverges, is_good=False),
+                _no_truth(row) if row.is_consistent is None else _yes_no(row.is_consistent, is_good=True),
+                _no_truth(row) if row.diverges is None else _yes_no(row.diverges, is_good=False),
             )
         )
-    return Grid("Algorithms", ALGORITHM_HEADS, rows, ALGORITHM_CAPTION, ("cooperative_tracks",))
+    refused = "".join(f" {title_of(row.algorithm)}, {row.refused}." for row in answer.algorithms if row.refused)
+    return Grid("Algorithms", ALGORITHM_HEADS, rows, ALGORITHM_CAPTION + refused, ("cooperative_tracks",))
 
 
 def _costs(answer: CooperativeResult) -> Grid:
@@ -238,14 +240,17 @@ def _costs(answer: CooperativeResult) -> Grid:
             number(row.bytes_per_slot, 0),
         )
         for row in answer.algorithms
+        if not row.refused
     ]
     numbers_of = ("cooperative_map", "cooperative_traffic")
     return Grid("Stability, measurements and data link", COST_HEADS, rows, COST_CAPTION, numbers_of)
 
 
-def _yes_no(value: bool | None, is_good: bool) -> Mark:
-    if value is None:
-        return Mark("unknown", "no truth")
+def _no_truth(row: AlgorithmRow) -> Mark:
+    return Mark("unknown", "not run" if row.refused else "no truth")
+
+
+def _yes_no(value: bool, is_good: bool) -> Mark:
     return Mark("good" if value is is_good else "bad", "yes" if value else "no")
 
 

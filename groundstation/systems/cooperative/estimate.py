@@ -13,10 +13,11 @@ from groundstation.systems.cooperative.algorithms import run_algorithm
 from groundstation.systems.cooperative.answer import AlgorithmRow, CooperativeResult, GeometryRow, LinkRow, VehicleRow
 from groundstation.systems.cooperative.consistency import TrackJudgement, judge
 from groundstation.systems.cooperative.events import Prepared, prepare, require_vehicles
+from groundstation.systems.cooperative.expected_honesty import HonestyCheck, check_pairwise, refusals, with_checks
 from groundstation.systems.cooperative.geometry import Geometry, Truth, bound_of, geometry_of
 from groundstation.systems.cooperative.loop_types import KINDS, PEER, POINT, USED
 from groundstation.systems.cooperative.settings import ALGORITHMS, CooperativeSettings
-from groundstation.systems.cooperative.tracks import AlgorithmRun
+from groundstation.systems.cooperative.tracks import AlgorithmRun, VehicleTrack
 from groundstation.tables.session import Session
 
 SELDOM_GATED = 0.2
@@ -66,17 +67,23 @@ def estimate_session(
     prepared = prepare(session, settings)
     require_vehicles(prepared)
     truth = truth or {}
-    judged = [_judged(prepared, run_algorithm(prepared, settings, name), truth) for name in algorithms]
+    judged: list[JudgedRun] = []
+    checks: dict[str, HonestyCheck] = {}
+    for name in algorithms:
+        if name == "pairwise" and judged:
+            checks[name] = check_pairwise(prepared, settings, _reference_tracks(judged))
+        if name not in checks or not checks[name].refused:
+            judged.append(_judged(prepared, run_algorithm(prepared, settings, name), truth))
     default = next((one for one in judged if one.run.algorithm == DEFAULT), judged[-1])
     bound = bound_of(prepared.session, settings, truth)
     geometry = geometry_of(prepared.session, settings, default.run)
-    findings = [*prepared.findings, *_findings(judged, settings)]
+    findings = [*prepared.findings, *_findings(judged, settings), *refusals(checks)]
     slots = len(np.unique(prepared.events.slot[np.isin(prepared.events.kind, (PEER, POINT))]))
     last = max(vehicle.last_s for vehicle in prepared.vehicles)
     answer = CooperativeResult(
         frame=session.frame,
         default_algorithm=default.run.algorithm,
-        algorithms=tuple(_algorithm_row(prepared, one, bound, slots) for one in judged),
+        algorithms=with_checks([_algorithm_row(prepared, one, bound, slots) for one in judged], checks, algorithms),
         vehicles=tuple(row for one in judged for row in _vehicle_rows(prepared, one)),
         geometry=tuple(_geometry_row(one) for one in geometry),
         links=_link_rows(prepared, default.run),
@@ -94,6 +101,11 @@ def estimate_session(
         ),
     )
     return answer, tuple(findings)
+
+
+def _reference_tracks(judged: Sequence[JudgedRun]) -> tuple[VehicleTrack, ...]:
+    """Return the tracks of the default algorithm, about which others are examined."""
+    return next((one for one in judged if one.run.algorithm == DEFAULT), judged[0]).run.tracks
 
 
 @np.errstate(over="ignore", invalid="ignore")

@@ -123,6 +123,9 @@ class CooperativeSettings:
     correlated_share, correlation_s : float
         Share of the variance of ranges and bearings that stays while a pair measures again, and for how long. The gate
         knows the spread of one reading alone.
+    pairwise_nees_limit : float
+        ``pairwise`` is refused where geometry and stated sigmas let expect a larger NEES at some time; 2 is honest, 0
+        switches the check off.
     """
 
     update: Update = "sequential"
@@ -139,6 +142,7 @@ class CooperativeSettings:
     range_share: float = number(0.0, 0.0, 1.0)
     correlated_share: float = number(0.0, 0.0, 1.0)
     correlation_s: float = number(5.0, 0.01)
+    pairwise_nees_limit: float = number(2.5, 0.0)
     ins: InsBelief = field(default_factory=InsBelief)
     odometry: OdometryBelief = field(default_factory=OdometryBelief)
     camera: CameraBelief = field(default_factory=CameraBelief)

@@ -5,12 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from groundstation.methods.intervals import nees_limits
+from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_scenario import load_session, session_names
+from groundstation.systems.cooperative.consistency import normalised
+from groundstation.systems.cooperative.events import prepare
 from groundstation.systems.cooperative.geometry import dilution
 from groundstation.systems.cooperative.study.cases import CASES, FIRST_SEED, settings_of
 from groundstation.systems.cooperative.study.cooperative import study_cooperative
 from groundstation.systems.cooperative.study.page import is_near, measured
 from groundstation.systems.cooperative.study.runs import CaseRun, diverges
+from groundstation.systems.cooperative.study.source_formula import RULES, run_rule
 
 
 def outcome(error_m: tuple[float, float], late_ratio: float = 1.0) -> CaseRun:
@@ -35,7 +40,8 @@ def test_metrics_by_hand() -> None:
     assert measured(case, several) == pytest.approx((10.0, 20.0))
     assert measured(replace(case, metric="sigma_r_m"), several) == pytest.approx((5.0, 10.0))
     assert measured(replace(case, metric="gain_over_ins"), several) == pytest.approx((2.0, 3.0))
-    assert measured(replace(case, metric="sigma_axis_m"), several) == pytest.approx((4.0, 8.0))
+    assert measured(replace(case, metric="sigma_x_m"), several) == pytest.approx((3.0, 6.0))
+    assert measured(replace(case, metric="sigma_y_m"), several) == pytest.approx((4.0, 8.0))
     assert measured(replace(case, metric="correlation"), several)[1] == pytest.approx(1.0)
 
 
@@ -50,7 +56,7 @@ def test_verdicts() -> None:
 @pytest.mark.slow
 def test_a_small_study_twice_is_the_same_and_says_what_it_did() -> None:
     cases = [case for case in CASES if case.name in ("one-four-satellites", "exact-alone")]
-    one, two = (study_cooperative(1, 1, cases=cases, workers=1) for _ in range(2))
+    one, two = (study_cooperative(1, 1, cases=cases, nets=(), workers=1) for _ in range(2))
     assert one.markdown == two.markdown
     table = one.tables[0]
     assert str(FIRST_SEED + 1) in one.markdown and "3-4 m" in one.markdown
@@ -65,3 +71,31 @@ def test_dilution_of_two_ranges_is_one_over_the_sine() -> None:
         assert np.linalg.det(H.T @ H) == pytest.approx(np.sin(angle) ** 2)
         assert dilution(H, has_clock=False)[0] == pytest.approx(np.sqrt(2.0) / np.sin(angle))
         assert all(np.isnan(value) for value in dilution(H, has_clock=True))
+
+
+def test_cases_that_differ_in_the_axis_alone_share_their_runs() -> None:
+    cases = {case.name: case for case in CASES}
+    assert cases["turn-after"].run == cases["turn-after-y"].run != cases["turn-before"].run
+    assert cases["turn-after"].metric == "sigma_x_m" and np.isnan(cases["turn-after-y"].low)
+    assert cases["formula-25"].run != cases["considered-25"].run
+
+
+def test_the_published_formula_claims_a_gain_that_its_errors_do_not_show() -> None:
+    """Errors of the rule that considers those of the primaries stay inside its sigma."""
+    shipped = load_session("ranked-25-degrees")
+    scenario = replace(shipped, link=replace(shipped.link, frame_s=5.0), epoch_s=5.0)
+    settings = replace(settings_of(scenario, replace(CASES[0], update="simultaneous")), output_step_s=50.0)
+    runs = 6
+    nees = dict.fromkeys(RULES, 0.0)
+    sigma_m: dict[str, float] = {}
+    for run in range(runs):
+        simulated = simulate_session(scenario, 4, run)
+        prepared = prepare(simulated.session, settings)
+        for rule in RULES:
+            track, truth = run_rule(prepared, settings, rule).tracks[2], simulated.truth[2]
+            error = track.state[:, :2] - truth.states[np.searchsorted(truth.time_s, track.time_s - 1e-6), :2]
+            nees[rule] += float(normalised(error, track.horizontal_m2)[-1]) / runs
+            sigma_m[rule] = float(track.two_sigma_r_m[-1])
+    assert sigma_m["multilevel_noise"] / sigma_m["published_formula"] > 1.5
+    low, high = nees_limits(2, runs, 0.999)
+    assert low < nees["considered_errors"] < high < 0.1 * nees["published_formula"]

@@ -1,6 +1,6 @@
 """Published figures of navigation between aircraft, each with the session for it."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Literal
 
 from groundstation.simulation.session_scenario import SessionScenario
@@ -8,7 +8,8 @@ from groundstation.systems.cooperative.settings import CooperativeSettings, InsB
 
 FIRST_SEED = 80_000  # no smaller seed belongs to this study
 FACTOR = 2.0  # a figure of ours within so many times of the published one counts as the same
-Metric = Literal["two_sigma_r_m", "sigma_r_m", "sigma_axis_m", "gain_over_ins", "correlation", "diverges"]
+Metric = Literal["two_sigma_r_m", "sigma_r_m", "sigma_x_m", "sigma_y_m", "gain_over_ins", "correlation", "diverges"]
+Verdict = Literal["reproduced", "under a stated condition", "refuted", "not reproducible", "beyond the source"]
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,8 @@ class PublishedCase:
         Second algorithm, for a gain over another than the INS.
     why : str
         Why ours may lie outside a factor of two, or what the figure depends on.
+    verdict : Verdict
+        Our judgement of the published figure, made by hand from the rows; ``why`` says the reason or the condition.
     """
 
     name: str
@@ -51,10 +54,54 @@ class PublishedCase:
     update: Update = "sequential"
     against: str = "dead_reckoning"
     why: str = ""
+    verdict: Verdict = "reproduced"
+
+    @property
+    def run(self) -> tuple[object, ...]:
+        """Key of the runs: cases that differ in the metric alone share them."""
+        against = self.against if self.metric == "gain_over_ins" else self.algorithm
+        return self.session, self.algorithm, self.update, self.aircraft, self.at_s, against
 
 
 def _global(name: str, title: str, low: float, high: float, published: str, why: str = "") -> PublishedCase:
     return PublishedCase(name, title, name, "centralised", "two_sigma_r_m", low, high, published, why=why)
+
+
+def _axes(case: PublishedCase) -> tuple[PublishedCase, PublishedCase]:
+    """Return a case of the published axis x (north), and one of y without a published figure."""
+    other = replace(
+        case,
+        name=f"{case.name}-y",
+        title=f"{case.title}, y",
+        metric="sigma_y_m",
+        low=NONE,
+        high=NONE,
+        published="not given",
+        why="",
+        verdict="beyond the source",
+    )
+    return replace(case, title=f"{case.title}, x"), other
+
+
+def _gain(
+    name: str, title: str, session: str, algorithm: str, against: str, why: str, verdict: Verdict = "refuted"
+) -> PublishedCase:
+    """Return a case of the gain of one rule over another; the secondary is C."""
+    low, high, published = (2, 3, "2-3 times better") if verdict == "refuted" else (NONE, NONE, "not given")
+    return PublishedCase(
+        name,
+        title,
+        session,
+        algorithm,
+        "gain_over_ins",
+        low,
+        high,
+        published,
+        "C",
+        against=against,
+        why=why,
+        verdict=verdict,
+    )
 
 
 INFINITE, NONE = float("inf"), float("nan")
@@ -129,7 +176,9 @@ CASES: tuple[PublishedCase, ...] = (
         1.43,
         "no more than 25-30 % better",
         why="A net whose form is known has three unknowns left of 2 k: the bound is "
-        "sqrt(2 k / 3) = 2 for six aircraft. The published limit is refuted.",
+        "sqrt(2 k / 3) = 2 for six aircraft. The filter claims a little more than that and is not consistent: 400 runs "
+        "show it, 100 need not.",
+        verdict="refuted",
     ),
     PublishedCase(
         "exact-alone",
@@ -197,15 +246,27 @@ CASES: tuple[PublishedCase, ...] = (
     ),
     PublishedCase(
         "multilevel",
-        "multilevel: 2 primaries, 1 secondary",
+        "multilevel: 2 primaries, 1 secondary, x",
         "ranked-points",
         "ranked",
-        "sigma_axis_m",
+        "sigma_x_m",
         100,
         100,
         "about 100 m per coordinate",
         "C",
         why="Errors of the primaries last for minutes and are taken for white noise: over-confident, not divergent.",
+    ),
+    PublishedCase(
+        "multilevel-y",
+        "multilevel: 2 primaries, 1 secondary, y",
+        "ranked-points",
+        "ranked",
+        "sigma_y_m",
+        100,
+        100,
+        "about 100 m per coordinate",
+        "C",
+        why="As above.",
     ),
     PublishedCase(
         "multilevel-gain",
@@ -234,72 +295,94 @@ CASES: tuple[PublishedCase, ...] = (
         "1 / (1 + (own / common)^2): 0.954 where the primaries' own errors are 0.22 of the common one. With clocks of "
         "30 m and 3 m/s one range to it cannot tell place from clock, and no geometry of one range each reaches it.",
     ),
-    PublishedCase(
-        "modified",
-        "modified against multilevel, 2 primaries",
-        "ranked-two-primaries",
-        "modified",
-        "gain_over_ins",
-        2,
-        3,
-        "2-3 times better",
-        "C",
-        against="ranked",
-        why="2 to 3 is 1 / sin of the angle between the lines, in computed sigmas of one update from primaries "
-        "whose whole error is common. Here part of it is their own and ranges gather for minutes: neither the computed "
-        "sigma nor the error against truth gains.",
+    *_axes(
+        PublishedCase(
+            "turn-before",
+            "2 primaries on 2 points, before the turn",
+            "ranked-points-turn",
+            "modified",
+            "sigma_x_m",
+            100,
+            100,
+            "sigma_x 100 m",
+            "C",
+            295.0,
+            why="The published axis is x. Errors of the primaries last for minutes and are taken for white noise.",
+        )
     ),
-    PublishedCase(
-        "modified-three",
-        "modified against multilevel, 3 primaries",
-        "ranked-three-primaries",
-        "modified",
-        "gain_over_ins",
-        2,
-        3,
-        "2-3 times better",
-        "C",
-        against="ranked",
-        why="As above.",
+    *_axes(
+        PublishedCase(
+            "turn-after",
+            "2 primaries on 2 points, one has turned",
+            "ranked-points-turn",
+            "modified",
+            "sigma_x_m",
+            15,
+            20,
+            "sigma_x 15-20 m",
+            "C",
+            why="The published axis is x. The filter computes less than the source and makes more: errors of the "
+            "primaries last for minutes and are taken for white noise. It is not the linearisation: with all errors a "
+            "tenth of theirs the NEES is the same. The centralised filter of the same session is honest.",
+            verdict="refuted",
+        )
     ),
-    PublishedCase(
-        "turn-before",
-        "2 primaries on 2 points, before the turn",
-        "ranked-points-turn",
-        "modified",
-        "sigma_axis_m",
-        100,
-        100,
-        "sigma_x 100 m",
-        "C",
-        295.0,
-        why="The computed sigma is the source's; errors against truth are larger because those of the primaries last "
-        "for minutes and are taken for white noise: over-confident, not divergent.",
+    *_axes(
+        PublishedCase(
+            "turn-after-centralised",
+            "2 primaries on 2 points, one has turned",
+            "ranked-points-turn",
+            "centralised",
+            "sigma_x_m",
+            15,
+            20,
+            "sigma_x 15-20 m",
+            "C",
+        )
     ),
-    PublishedCase(
-        "turn-after",
-        "2 primaries on 2 points, one has turned",
-        "ranked-points-turn",
-        "modified",
-        "sigma_axis_m",
-        15,
-        20,
-        "15-20 m",
-        "C",
-        why="The computed sigma is the source's; errors against truth are larger because those of the primaries last "
-        "for minutes and are taken for white noise: over-confident, not divergent. It is not the linearisation: with "
-        "all errors a tenth of theirs the NEES is the same. The centralised filter of the same session is honest.",
+    *(
+        _gain(
+            name,
+            f"modified against multilevel, {title}",
+            f"ranked-{session}",
+            "modified",
+            "ranked",
+            why,
+        )
+        for name, title, session, why in (
+            (
+                "modified",
+                "2 primaries 53 deg apart",
+                "two-primaries",
+                "1 / sin 53 deg = 1.25 is the most that the source's formula promises here. A consider filter of the "
+                "controller's error: it neither claims nor makes a gain.",
+            ),
+            ("modified-three", "3 primaries", "three-primaries", "As above."),
+            (
+                "modified-25",
+                "2 primaries 25 deg apart, clocks known",
+                "25-degrees",
+                "As above, where the source's formula promises 1 / sin 25 deg = 2.4.",
+            ),
+        )
     ),
-    PublishedCase(
-        "turn-after-centralised",
-        "2 primaries on 2 points, one has turned",
-        "ranked-points-turn",
-        "centralised",
-        "sigma_axis_m",
-        15,
-        20,
-        "15-20 m",
-        "C",
+    _gain(
+        "formula-25",
+        "source's formula against multilevel, 25 deg, clocks known",
+        "ranked-25-degrees",
+        "published_formula",
+        "multilevel_noise",
+        "The published gain is one of computed sigmas; errors against truth hardly gain. The common error stays for "
+        "the whole flight and is taken for white noise.",
+    ),
+    _gain(
+        "considered-25",
+        "all errors of the primaries considered, 25 deg, clocks known",
+        "ranked-25-degrees",
+        "considered_errors",
+        "multilevel_noise",
+        "Honest, and no better than multilevel in its errors by more than measured: what ranks can reach.",
+        "beyond the source",
     ),
 )
 

@@ -17,8 +17,11 @@ from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_scenario import load_session
 from groundstation.systems.cooperative.algorithms import run_algorithm
 from groundstation.systems.cooperative.consistency import DIVERGED, normalised
-from groundstation.systems.cooperative.events import prepare
+from groundstation.systems.cooperative.events import Prepared, prepare
+from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.study.cases import PublishedCase, settings_of
+from groundstation.systems.cooperative.study.source_formula import RULES, run_rule
+from groundstation.systems.cooperative.tracks import AlgorithmRun
 
 Progress = Callable[[str], None]
 WORKERS = 2
@@ -70,21 +73,19 @@ def run_cases(
 
     Cases of one session see the same flights, whatever the number of workers.
     """
-    outcomes: dict[str, tuple[CaseRun, ...]] = {}
-    jobs = [(case, seed, run) for case in cases for run in range(runs)]
-    if workers <= 1 or len(jobs) < 8:
-        found = [fly(*job) for job in jobs]
-        for at, case in enumerate(cases):
-            outcomes[case.name] = tuple(found[at * runs : (at + 1) * runs])
-        return outcomes
+    flown: dict[tuple[object, ...], tuple[CaseRun, ...]] = {}
+    different = list({case.run: case for case in cases}.values())
+    if workers <= 1 or len(different) * runs < 8:
+        for case in different:
+            flown[case.run] = tuple(fly(case, seed, run) for run in range(runs))
+        return {case.name: flown[case.run] for case in cases}
     with ProcessPoolExecutor(min(workers, os.cpu_count() or 1), mp_context=get_context("spawn")) as pool:
-        for case in cases:
-            own = zip(*(job for job in jobs if job[0] is case), strict=True)
-            several = pool.map(fly, *own, chunksize=max(1, runs // (4 * workers)))
-            outcomes[case.name] = tuple(several)
+        for case in different:
+            own = zip(*((case, seed, run) for run in range(runs)), strict=True)
+            flown[case.run] = tuple(pool.map(fly, *own, chunksize=max(1, runs // (4 * workers))))
             if progress:
                 progress(f"{case.name}: {runs} runs")
-    return outcomes
+    return {case.name: flown[case.run] for case in cases}
 
 
 def fly(case: PublishedCase, seed: int, run: int) -> CaseRun:
@@ -93,10 +94,10 @@ def fly(case: PublishedCase, seed: int, run: int) -> CaseRun:
     settings = settings_of(scenario, case)
     simulated = simulate_session(scenario, seed, run)
     prepared = prepare(simulated.session, settings)
-    done = run_algorithm(prepared, settings, case.algorithm)
+    done = _run(prepared, settings, case.algorithm)
     other = done
     if case.metric == "gain_over_ins":
-        other = run_algorithm(prepared, settings, case.against)
+        other = _run(prepared, settings, case.against)
     who = simulated.session.names.index(case.aircraft)
     errors = []
     for track, truth in zip(done.tracks, simulated.truth, strict=True):
@@ -121,6 +122,12 @@ def fly(case: PublishedCase, seed: int, run: int) -> CaseRun:
         radius=float(np.median(done.map_radius[half:])) if len(done.map_radius) else float("nan"),
         bytes_per_frame=sum(size for _, size in done.messages.values()) / frames,
     )
+
+
+def _run(prepared: Prepared, settings: CooperativeSettings, algorithm: str) -> AlgorithmRun:
+    if algorithm in RULES:
+        return run_rule(prepared, settings, algorithm)
+    return run_algorithm(prepared, settings, algorithm)
 
 
 def _ratio(errors: list[FloatArray], tracks: Sequence[object], first: float, last: float) -> float:
