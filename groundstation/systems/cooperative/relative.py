@@ -1,7 +1,7 @@
 """Covariances of the places of vehicles to one another.
 
-They come from the algorithms that keep what two vehicles have in common. A filter of one vehicle alone claims nothing of
-its error together with another's.
+They come from the algorithms that keep what two vehicles have in common. A filter of one vehicle alone claims nothing
+of its error together with another's.
 """
 
 from collections.abc import Iterator
