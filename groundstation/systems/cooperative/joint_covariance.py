@@ -16,9 +16,9 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray
 from groundstation.systems.cooperative.events import Prepared
+from groundstation.systems.cooperative.filters.observation import LinearisedMeasurement, rows_of
+from groundstation.systems.cooperative.filters.steps import MeasurementEvent, steps
 from groundstation.systems.cooperative.loop_types import PEER, POINT, USED
-from groundstation.systems.cooperative.plain.observation import LinearisedMeasurement, rows_of
-from groundstation.systems.cooperative.plain.steps import MeasurementEvent, steps
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.tracks import AlgorithmRun, VehicleTrack
 
@@ -75,13 +75,17 @@ class JointCovariance:
 
     def rows(self, event: MeasurementEvent) -> list[LinearisedRow]:
         """Return the rows of an event at the vehicles' own times."""
-        source_m, clock_m, derivative = None, 0.0, np.zeros((3, 0))
+        source_m, clock_m, derivative, sights = None, 0.0, np.zeros((3, 0)), self.prepared.sights
         if event.kind == PEER:
-            peer, x = self.prepared.vehicles[event.source], self.x[event.source]
-            source_m, derivative = peer.place(x, event.time_s)
+            peer, x, sight = self.prepared.vehicles[event.source], self.x[event.source], sights.source(event.number)
+            if sight is None:
+                source_m, derivative = peer.place(x, event.time_s)
+            else:
+                source_m, derivative = sight.reading + sight.derivative @ x, sight.derivative
             clock_m = float(x[peer.clock]) if peer.clock >= 0 else 0.0
         mine, found = self.prepared.vehicles[event.receiver], []
-        for row in rows_of(event, mine, self.x[event.receiver], source_m, clock_m):
+        sight = sights.receiver(event.number)
+        for row in rows_of(event, mine, self.x[event.receiver], source_m, clock_m, sight=sight):
             by_source = None
             if event.kind == PEER:
                 by_source = row.by_source(self.prepared.vehicles[event.source], derivative)

@@ -12,8 +12,8 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.expected_honesty import PairwiseCovariances
+from groundstation.systems.cooperative.filters.steps import steps
 from groundstation.systems.cooperative.joint_covariance import joint_covariances, used_events
-from groundstation.systems.cooperative.plain.steps import steps
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.tracks import AlgorithmRun
 

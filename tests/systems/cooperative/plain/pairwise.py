@@ -143,7 +143,7 @@ class Pairwise:
         gain = shared / total
         after = P - np.outer(shared, gain)
         for who, before, place in ((one, one.P, slice(0, n)), (other, other.P, slice(n, None))):
-            scale = after_over_before(after[place, place], before)
+            scale = _over(after[place, place], before)
             who.factors = {
                 third: factor if third in (i, j) else scale @ factor for third, factor in who.factors.items()
             }
@@ -156,7 +156,7 @@ class Pairwise:
         return True
 
 
-def after_over_before(after: FloatArray, before: FloatArray) -> FloatArray:
+def _over(after: FloatArray, before: FloatArray) -> FloatArray:
     """Return after @ inverse(before), scaled by the sigmas.
 
     States differ by eight powers of ten.
