@@ -30,6 +30,8 @@ from groundstation.systems.cooperative.loop_types import PEER
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.tracks import VehicleTrack
 
+ENOUGH = 4.0  # times the limit: what comes after is not worked out
+
 
 @dataclass(frozen=True)
 class ExpectedNees:
@@ -183,13 +185,13 @@ def check_pairwise(prepared: Prepared, settings: CooperativeSettings, about: tup
     limit = settings.pairwise_nees_limit
     if limit <= 0.0:
         return HonestyCheck(2.0, "")
-    found = expected_nees(prepared, settings, about, limit)
+    found = expected_nees(prepared, settings, about, ENOUGH * limit)
     if found.worst <= limit:
         return HonestyCheck(found.worst, "")
     at_s = float(found.time_s[int(np.argmax(found.nees))])
     reason = (
-        f"NEES {found.worst:.3g} to expect at {at_s:.0f} s where 2 is honest (limit {limit:g}), with "
-        f"{_density(prepared)}: it is for sparse encounters that close no loops"
+        f"a NEES of {found.worst:.3g}{'' if found.is_whole else ' or more'} is to be expected at {at_s:.0f} s where 2 is "
+        f"honest (limit {limit:g}), with {_density(prepared)}: it is for sparse encounters that close no loops"
     )
     return HonestyCheck(found.worst, reason)
 

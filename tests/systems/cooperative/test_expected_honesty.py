@@ -75,7 +75,7 @@ def test_a_dense_session_refuses_and_a_sparse_one_runs() -> None:
         assert not unchecked.algorithms[-1].refused
         if name == "sparse":
             assert unchecked.algorithms[-1].two_sigma_r_m == rows[name].two_sigma_r_m
-    assert rows["dense"].refused.startswith("refused: NEES ") and rows["dense"].two_sigma_r_m is None
+    assert rows["dense"].refused.startswith("refused: a NEES of ") and rows["dense"].two_sigma_r_m is None
     assert "10 pairs (6 loops)" in rows["dense"].refused
     assert rows["sparse"].refused == "" and rows["sparse"].expected_nees == pytest.approx(2.0, abs=0.1)
 
