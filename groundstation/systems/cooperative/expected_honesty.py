@@ -190,8 +190,8 @@ def check_pairwise(prepared: Prepared, settings: CooperativeSettings, about: tup
         return HonestyCheck(found.worst, "")
     at_s = float(found.time_s[int(np.argmax(found.nees))])
     reason = (
-        f"a NEES of {found.worst:.3g}{'' if found.is_whole else ' or more'} is to be expected at {at_s:.0f} s where 2 is "
-        f"honest (limit {limit:g}), with {_density(prepared)}: it is for sparse encounters that close no loops"
+        f"a NEES of {found.worst:.3g}{'' if found.is_whole else ' or more'} is to be expected at {at_s:.0f} s where 2 "
+        f"is honest (limit {limit:g}), with {_density(prepared)}: it is for sparse encounters that close no loops"
     )
     return HonestyCheck(found.worst, reason)
 

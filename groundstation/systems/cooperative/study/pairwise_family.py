@@ -58,8 +58,9 @@ class Net:
 
 
 FAMILY: tuple[Net, ...] = (
-    *(Net(k, points, frame_s) for k in (3, 5, 10) for points in (0, 1, 2) for frame_s in (10.0, 60.0, 250.0)),
-    Net(3, 2, 1.0),
+    *(Net(k, points, frame_s) for k in (3, 5) for points in (0, 1, 2) for frame_s in (10.0, 60.0, 250.0)),
+    *(Net(10, points, frame_s) for points in (0, 2) for frame_s in (60.0, 250.0)),
+    *(Net(3, 2, 1.0), Net(10, 2, 10.0)),
     *(Net(k, points, frame_s, "chain") for k in (3, 5) for points in (0, 2) for frame_s in (10.0, 60.0)),
     *(Net(3, 0, 60.0, broken=broken) for broken in ("velocity", "bias", "outliers")),
 )
