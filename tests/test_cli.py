@@ -134,15 +134,12 @@ def test_settings_beside_logs_are_no_logs_and_what_is_skipped_is_told_by_reason(
     assert planned == "alt.csv  to run\n" and "skipped 2 files" in err and "toml" not in err
     assert not (tmp_path / "out").exists()
     code, first, err = groundstation(*arguments)
-    assert (
-        code == 0
-        and first.startswith("alt.csv  done  NOTIME_")
-        and "2 s of barometer at 1 Hz; nothing lost; not assessable: heading (" in first
-    )
+    assert code == 0 and "  NOTIME_" in first
+    assert first.startswith("alt.csv  2 s of barometer at 1 Hz; nothing lost; not assessable: heading (")
     (line,) = [line for line in err.splitlines() if line.startswith("skipped")]
     assert line.startswith("skipped 2 files, a.txt, b.txt: found text that no reader claims")
     _, second, err = groundstation(*arguments)
-    assert second == first.replace("  done  ", "  finished before  ")
+    assert second == first.replace("  NOTIME_", "  finished before  NOTIME_")
     assert err.splitlines()[-1].endswith("; 1 was finished before")
 
 

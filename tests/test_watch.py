@@ -106,7 +106,7 @@ def test_what_was_refused_is_tried_again_and_told_once(tmp_path: Path, monkeypat
     (tmp_path / "a.csv").write_text("1")
     looks = Looks(tmp_path, monkeypatch, refused=("another run", "another run"))
     assert looks.play(nothing, nothing, nothing, nothing) == [["a.csv"]]
-    assert looks.said == ["another run"]
+    assert looks.said[0].startswith(f"watching {tmp_path}: 1 file there now") and looks.said[1:] == ["another run"]
 
 
 def test_a_look_that_could_run_nothing_has_failed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -136,7 +136,7 @@ def test_a_share_that_goes_and_comes_back_is_no_reason_to_run_again(
     away = tmp_path / "away"
     batches = looks.play(nothing, lambda: share.rename(away), nothing, lambda: away.rename(share), nothing, nothing)
     assert batches == [["a.csv"]]
-    assert len(looks.said) == 1
+    assert len(looks.said) == 2
 
 
 def test_a_bag_is_as_large_as_its_files(tmp_path: Path) -> None:

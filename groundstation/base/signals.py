@@ -168,6 +168,11 @@ TOPICS: Mapping[str, tuple[Field, ...]] = MappingProxyType(
             _heading("course_magnetic_deg"),
         ),
         "discrete": (_flag("weight_on_wheels"),),
+        "configuration": (
+            _double("flap_deg", "deg", -10.0, 90.0),
+            *(_flag(f"gear_{leg}down") for leg in ("", "nose_", "left_", "right_")),
+        ),
+        "engine": tuple(_double(f"{name}_share", "", -1.0, 2.0) for name in ("n1", "power", "throttle")),
         "event": (_text("name"), _text("severity")),
         "link": (
             _double("pseudorange_m", "m"),

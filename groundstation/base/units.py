@@ -65,6 +65,7 @@ CONVERSIONS: Mapping[str, tuple[str, float]] = MappingProxyType(
         "us": ("s", 1e-6),
         "c": ("c", 1.0),
         "": ("", 1.0),
+        "percent": ("", 0.01),
     }
 )
 

@@ -25,7 +25,7 @@ DONE, FAILED, USAGE, DATA_LOST, LIMIT_REACHED = 0, 1, 2, 3, 4
 INTERRUPTED = 130
 EXIT_CODES = (
     "Exit codes: 0 done; 1 could not read or compute; 2 usage; 3 done, with data lost (truncated, corrupt spans, "
-    "channels dropped); 4 done, and --fail-on reached. For several logs the worst wins (1, 4, 3, 0)."
+    "channels dropped); 4 done, and --fail-on reached; 130 interrupted. For several logs the worst wins (1, 4, 3, 0)."
 )
 
 VERBS = (
@@ -44,6 +44,7 @@ VERBS = (
         "plan",
         "profile",
         "rules",
+        "runways",
         "serve",
     ),
     *("simulate", "study", "list"),
@@ -77,6 +78,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "cooperative": ("cooperative a.csv b.csv --stations stations.toml -o out",),
     "profile": ("profile new log.csv -o my.toml", "profile check my.toml log.csv", "profile list"),
     "rules": ("rules test stricter.toml --over out", "rules test stricter.toml --over out -o changes.csv"),
+    "runways": ("runways near 60.19 11.07", "runways show ENGM 01L", "runways update runways.csv"),
     "serve": ("serve out",),
     "simulate": ("simulate taxi-good -o logs",),
     "study": ("study heading -o tables --runs 50",),

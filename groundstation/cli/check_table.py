@@ -9,7 +9,8 @@ from groundstation.base.signals import is_canonical
 from groundstation.base.text_columns import columns
 from groundstation.chapters.parts import Grid, Head
 from groundstation.chapters.terminal import grid_text
-from groundstation.cli.printing import tell_errors, totals
+from groundstation.cli.lines import tell_errors
+from groundstation.cli.printing import totals
 from groundstation.cli.text import as_json, printable, say, tell
 from groundstation.pipeline.verbs.check import CheckedLog
 

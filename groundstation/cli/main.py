@@ -16,7 +16,7 @@ from groundstation.base.errors import UsageError
 from groundstation.base.garbage import importing
 from groundstation.base.version import __version__
 from groundstation.base.without_pandas import spare_pandas
-from groundstation.cli import fleets, flights, plans, profiles, rules, simulated, single_logs, watching
+from groundstation.cli import fleets, flights, plans, profiles, rules, runways, simulated, single_logs, watching
 from groundstation.cli.application import (
     DONE,
     INTERRUPTED,
@@ -54,9 +54,22 @@ from groundstation.cli.application import (
     tell_written,
     time_limit_s,
 )
+from groundstation.cli.completion import analyses
 
 # the modules hold more verbs
-__all__ = ["app", "fleets", "flights", "main", "plans", "profiles", "rules", "simulated", "single_logs", "watching"]
+__all__ = [
+    "app",
+    "fleets",
+    "flights",
+    "main",
+    "plans",
+    "profiles",
+    "rules",
+    "runways",
+    "simulated",
+    "single_logs",
+    "watching",
+]
 
 
 DRAWING = frozenset(("run", "watch", "report", "view", "compare", "cooperative"))  # verbs that write recordings
@@ -94,7 +107,12 @@ def run(
     reference: ReferenceFiles = None,
     without: Annotated[
         list[str] | None,
-        typer.Option("--without", help="Analysis to leave out (groundstation list); may be repeated.", metavar="NAME"),
+        typer.Option(
+            "--without",
+            help="Analysis to leave out (groundstation list); may be repeated.",
+            metavar="NAME",
+            autocompletion=analyses,
+        ),
     ] = None,
     jobs: Jobs = 0,
     scheduler: Annotated[
@@ -127,6 +145,9 @@ def run(
     store: Store = "",
     redo: Annotated[bool, typer.Option("--redo", help="Repeat what an earlier run finished.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Show what would be done; write nothing.")] = False,
+    is_opened: Annotated[
+        bool, typer.Option("--open", help="Then open the recording: of the flight, or of all of them.")
+    ] = False,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -142,11 +163,13 @@ def run(
     An OUT of an earlier run is continued: what it finished with the same logs and settings is not repeated.
     """
     from groundstation.cli import printing
+    from groundstation.cli.lines import LONGEST, Lines
     from groundstation.cli.progress import listener
     from groundstation.pipeline.many_flights.runs.batch import run_many, run_together
     from groundstation.pipeline.many_flights.runs.dry_run import plan_many
     from groundstation.pipeline.many_flights.runs.references import judged_by
     from groundstation.pipeline.one_flight.configuration import applying, installed_as, load_configuration
+    from groundstation.pipeline.one_flight.progress import silent
 
     refuse_pdf_of_results(only, pdf=pdf)
     settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd, weather, without)
@@ -163,6 +186,10 @@ def run(
         planned = plan(paths, output, configuration, redo=redo, stations=stations)
         printing.outcomes(planned, as_json_text=json, quiet=quiet, is_plan=True)
         return DONE
+    if is_opened:
+        from groundstation.pipeline.verbs.view import require_recordings_to_open
+
+        require_recordings_to_open(output, only_results=only == "results")
     timeout_s = time_limit_s(timeout)
     run_each = partial(
         run_many,
@@ -175,8 +202,9 @@ def run(
         store=store,
     )
     run_logs = run_together if together else run_each  # logs are joined again at every run, in this process
+    lines = Lines(longest=LONGEST, is_shown=not quiet, everything=verbose)
     try:
-        with listener("none" if quiet else progress) as listen:
+        with listener("none" if quiet else progress, silent if json else lines.listen) as listen:
             outcomes = run_logs(
                 paths,
                 output,
@@ -190,7 +218,11 @@ def run(
     except KeyboardInterrupt:
         say(f"interrupted: {output} keeps what is finished; the same command continues with the rest")
         return INTERRUPTED
-    printing.outcomes(outcomes, as_json_text=json, quiet=quiet, with_times=verbose)
+    printing.outcomes(outcomes, as_json_text=json, quiet=quiet, with_times=verbose, lines=lines)
+    if is_opened:
+        from groundstation.pipeline.verbs.view import open_results
+
+        open_results(output, outcomes, say=say)
     return printing.worst_code(outcomes)
 
 

@@ -19,6 +19,7 @@ from groundstation.cli.application import (
     app,
     tell,
 )
+from groundstation.cli.completion import plans_of
 
 plans = typer.Typer(
     help="Plan a session of several aircraft, or a landing by ranges, for the accuracy needed.",
@@ -27,9 +28,7 @@ plans = typer.Typer(
 )
 app.add_typer(plans, name="plan")
 
-Scenario = Annotated[
-    str | None, typer.Argument(help="Name of a shipped scenario, or a TOML file.", metavar="FILE", show_default=False)
-]
+SCENARIO = "Name of a shipped scenario, or a TOML file."
 Output = Annotated[
     Path | None, typer.Option("-o", "--output", help="Folder for the results.", metavar="OUT", show_default=False)
 ]
@@ -39,7 +38,10 @@ Listed = Annotated[bool, typer.Option("--list", help="List the shipped scenarios
 @plans.command()
 @answers_with_exit_code
 def session(
-    scenario: Scenario = None,
+    scenario: Annotated[
+        str | None,
+        typer.Argument(help=SCENARIO, metavar="FILE", show_default=False, autocompletion=plans_of("session")),
+    ] = None,
     output: Output = None,
     listed: Listed = False,
     fail_on: FailOn = "none",
@@ -57,7 +59,10 @@ def session(
 @plans.command()
 @answers_with_exit_code
 def landing(
-    scenario: Scenario = None,
+    scenario: Annotated[
+        str | None,
+        typer.Argument(help=SCENARIO, metavar="FILE", show_default=False, autocompletion=plans_of("landing")),
+    ] = None,
     output: Output = None,
     listed: Listed = False,
     fail_on: FailOn = "none",

@@ -6,8 +6,8 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from groundstation.base.text_columns import columns
+from groundstation.cli.lines import Lines
 from groundstation.cli.text import as_json, printable, say, tell
-from groundstation.pipeline.one_flight.log import log_name
 from groundstation.pipeline.one_flight.outcome import Outcome, State, worst_code
 from groundstation.pipeline.verbs.describe import BusWord, Description
 
@@ -72,44 +72,23 @@ def outcomes(
     quiet: bool = False,
     with_times: bool = False,
     is_plan: bool = False,
+    lines: Lines | None = None,
 ) -> None:
     """Print the outcome of each log: a line each on stdout, in the order of the logs.
 
-    A line has log, state, flight, answer. On stderr what was skipped, by reason, then failures, then totals. Of a plan
-    there is no state and no total.
+    Those that ``lines`` told as they were done are not told again. On stderr why logs failed, what was skipped, by
+    reason, then totals; of a plan there is no total.
     """
     if as_json_text:
         tell(as_json([_plain(outcome) for outcome in done]))
         return
-    names = _names(done)
-    for name, outcome in zip(names, done, strict=True):
-        if outcome.state not in ("failed", "skipped") and not quiet:
-            state = "finished before" if outcome.was_finished else _LINE_WORDS[outcome.state]
-            state = "" if is_plan else state
-            tell("  ".join(printable(part) for part in (name, state, outcome.flight_id, outcome.text) if part))
-        if with_times and outcome.times_s:
-            spent = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in outcome.times_s.items())
-            say(f"  {spent}")
-    if not quiet:
-        for line in skipped_lines(done, most=len(done) if with_times else MOST_SKIPPED):
-            say(line)
-    for outcome in done:
-        tell_errors(outcome, with_traces=with_times)
-    if sum(not one.is_beside for one in done) > 1 and not quiet and not is_plan:
+    (lines or Lines(is_shown=not quiet, everything=with_times)).tell(tuple(done))
+    if quiet:
+        return
+    for line in skipped_lines(done, most=len(done) if with_times else MOST_SKIPPED):
+        say(line)
+    if sum(not one.is_beside for one in done) > 1 and not is_plan:
         say(totals(done))
-
-
-def tell_errors(outcome: Outcome, *, with_traces: bool = False) -> None:
-    """Print on stderr why a log failed, and which parts of a flight did."""
-    traces = [outcome.trace] if outcome.state == "failed" else []
-    if outcome.state == "failed":
-        say(printable(f"error: {outcome.text}"))
-    name = outcome.source if outcome.is_session else log_name(Path(outcome.source))
-    for failure in outcome.failures:
-        say(printable(f"error: {name}: {failure.text}"))
-        traces.append(failure.trace)
-    for trace in filter(None, traces if with_traces else ()):
-        say(trace.rstrip())
 
 
 def removed(pdfs: Sequence[Path]) -> str:
@@ -122,13 +101,6 @@ def removed(pdfs: Sequence[Path]) -> str:
     """
     told, them = (str(pdfs[0]), "it") if len(pdfs) == 1 else (f"{len(pdfs)} PDFs", "them")
     return f"removed {told} of an earlier run; --pdf makes {them}"
-
-
-def _names(done: Sequence[Outcome]) -> list[str]:
-    """Return logs by the names of their files; by their paths where two files have one name."""
-    files = [outcome.source if outcome.is_session else log_name(Path(outcome.source)) for outcome in done]
-    paths = {file: {one.source for name, one in zip(files, done, strict=True) if name == file} for file in set(files)}
-    return [file if len(paths[file]) == 1 else outcome.source for file, outcome in zip(files, done, strict=True)]
 
 
 def skipped_lines(done: Sequence[Outcome], most: int) -> list[str]:
@@ -197,12 +169,6 @@ def _counted(noun: str, done: Sequence[Outcome], states: Sequence[State]) -> str
 
 
 MOST_SKIPPED = 5  # named in a line
-_LINE_WORDS: Mapping[State, str] = {
-    "done": "done",
-    "data_lost": "data lost",
-    "limit_reached": "at the limit",
-    "incomplete": "incomplete",
-}
 _STATE_WORDS: Mapping[State, str] = {
     "done": "done",
     "data_lost": "with data lost",

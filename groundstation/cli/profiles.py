@@ -22,6 +22,7 @@ from groundstation.cli.application import (
     tell,
     tell_written,
 )
+from groundstation.cli.completion import profiles as profile_names
 
 if TYPE_CHECKING:
     from groundstation.pipeline.verbs.profiles import Draft, ProfileCheck
@@ -84,7 +85,13 @@ def new(
 @answers_with_exit_code
 def check(
     profile: Annotated[
-        Path, typer.Argument(help="A profile (TOML), or the name of a shipped one.", metavar="PROFILE", readable=False)
+        Path,
+        typer.Argument(
+            help="A profile (TOML), or the name of a shipped one.",
+            metavar="PROFILE",
+            readable=False,
+            autocompletion=profile_names,
+        ),
     ],
     table: Table,
     fail_on: FailOn = "none",

@@ -11,19 +11,27 @@ from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 
 
 @contextmanager
-def listener(mode: Literal["auto", "none", "json"]) -> Iterator[Listener]:
-    """Yield a listener for progress events.
+def listener(mode: Literal["auto", "none", "json"], also: Listener = silent) -> Iterator[Listener]:
+    """Yield a listener for progress events; ``also`` hears each of them.
 
     ``auto`` draws a bar only where stderr is a terminal.
     """
+
+    def with_other(listen: Listener) -> Listener:
+        def both(event: Event) -> None:
+            also(event)
+            listen(event)
+
+        return both
+
     if mode == "json":
-        yield _as_json
+        yield with_other(_as_json)
     elif mode == "auto" and sys.stderr.isatty():
         _tell_of_compiling()
         with _bar() as listen:
-            yield listen
+            yield with_other(listen)
     else:
-        yield silent
+        yield also
 
 
 def _tell_of_compiling() -> None:
@@ -61,7 +69,9 @@ def _bar() -> Iterator[Listener]:
             return Text(f"{60.0 * task.speed:.1f}/min" if task.speed else "")
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Rate(""), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    # Lines of results go through the bar only where both are on one terminal: else they would go to stderr.
+    is_shared = sys.stdout.isatty()
+    with Progress(*columns, console=Console(stderr=True), transient=True, redirect_stdout=is_shared) as bar:
         task = bar.add_task("starting", total=None)
 
         def listen(event: Event) -> None:

@@ -21,12 +21,18 @@ from groundstation.cli.application import (
     tell,
     tell_written,
 )
+from groundstation.cli.completion import scenarios, studies
 
 
 @app.command(epilog=examples("simulate"))
 @answers_with_exit_code
 def simulate(
-    scenario: Annotated[str, typer.Argument(help="Name of a shipped scenario, or a TOML file.", metavar="SCENARIO")],
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            help="Name of a shipped scenario, or a TOML file.", metavar="SCENARIO", autocompletion=scenarios
+        ),
+    ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the log.", metavar="DIR")],
     seed: Annotated[int | None, typer.Option("--seed", help="Seed in place of the scenario's own.")] = None,
     form: Annotated[
@@ -58,6 +64,7 @@ def study(
         typer.Argument(
             help="A study; `groundstation list` names them.",
             metavar="NAME",
+            autocompletion=studies,
         ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the tables.", metavar="DIR")],

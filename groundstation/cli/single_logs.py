@@ -37,6 +37,7 @@ from groundstation.cli.application import (
     tell,
     time_bound,
 )
+from groundstation.cli.completion import analyses
 
 
 @app.command(epilog=examples("info"))
@@ -91,6 +92,7 @@ def check(
             "are): yes, no, in part, and what is missing where. Exit 4 at no; with --fail-on warn also at in part. "
             "Logs of a session are judged together.",
             metavar="ANALYSIS",
+            autocompletion=analyses,
         ),
     ] = "",
     aircraft: AircraftFile = None,

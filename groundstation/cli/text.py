@@ -1,6 +1,8 @@
 """Printing for all verbs: text that never drives the terminal, JSON for programs."""
 
 import json
+import os
+import sys
 from typing import Any
 
 import typer
@@ -17,6 +19,18 @@ def tell(text: str) -> None:
 def say(text: str) -> None:
     """Print everything else on stderr."""
     typer.echo(printable_lines(text), err=True)
+
+
+def tell_line(name: str, line: str, colour: str | None) -> None:
+    """Print a result at once, its first word in a colour where the terminal wants colours.
+
+    Not by typer's echo: that writes past a bar of progress on the same terminal.
+    """
+    line = printable(line)
+    if colour is not None and sys.stdout.isatty() and not os.environ.get("NO_COLOR"):
+        first, blank, rest = line.partition(" ")
+        line = typer.style(first, fg=colour) + blank + rest
+    print(printable(name), line, sep="  ", flush=True)
 
 
 def printable_lines(text: str) -> str:

@@ -85,9 +85,11 @@ def watch(
     It may be killed at any moment: the same command continues with what is not finished.
     """
     from groundstation.cli import printing
+    from groundstation.cli.lines import LONGEST, Lines
     from groundstation.cli.progress import listener
     from groundstation.pipeline.many_flights.runs.references import judged_by
     from groundstation.pipeline.one_flight.configuration import load_configuration
+    from groundstation.pipeline.one_flight.progress import silent
     from groundstation.pipeline.verbs.watching import fresh
     from groundstation.pipeline.verbs.watching import watch as looked_at
 
@@ -96,7 +98,8 @@ def watch(
     settings = load_configuration(config, aircraft, site, profile=profile, thresholds=thresholds, icds=icd)
     configuration = judged_by(settings, reference or (), is_one_log=False)
     every_outcome: list[Outcome] = []
-    with listener("none" if quiet else progress) as listen:
+    lines = Lines(longest=LONGEST, is_shown=not quiet, everything=verbose, only_news=True)
+    with listener("none" if quiet else progress, silent if json else lines.listen) as listen:
         batches = looked_at(
             *(folder, output, configuration),
             every_s=every,
@@ -114,7 +117,8 @@ def watch(
         )
         try:
             for outcomes in batches:
-                printing.outcomes(fresh(outcomes), as_json_text=json, quiet=quiet, with_times=verbose)
+                news = fresh(outcomes)
+                printing.outcomes(news, as_json_text=json, quiet=quiet, with_times=verbose, lines=lines)
                 every_outcome += outcomes if once else ()
         except KeyboardInterrupt:
             say(f"stopped: {output} keeps what is finished; the same command continues with the rest")

@@ -10,6 +10,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from groundstation.base.errors import GroundstationError, SettingsError
+from groundstation.base.runways.table import RunwayTable
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.toml_settings import check_ranges, number, required_number
 from groundstation.results.answer import A, Answers, answer_meeting, answer_of
@@ -252,6 +253,10 @@ class Known:
         What earlier flights say of installations, where the user gives a file of them.
     roles : mapping of role to callable
         What the analyses offer to each other, whether they gave an answer or not: ``roles[kind](known)`` makes it.
+    runways : RunwayTable, optional
+        Runways of the world, below those of ``site``; None: not looked up.
+    runways_problem : str
+        Why the user's own table is not that one.
     """
 
     phases: Phases
@@ -265,6 +270,8 @@ class Known:
     workings: Mapping[str, Any] = field(default_factory=dict)
     lessons: tuple[Lesson, ...] | None = None
     roles: Mapping[type[Any], Callable[["Known"], Any]] = field(default_factory=dict)
+    runways: RunwayTable | None = None
+    runways_problem: str = ""
 
     @property
     def excluded_s(self) -> tuple[tuple[float, float], ...]:

@@ -17,6 +17,7 @@ from groundstation.base.failures import attempt, left_out
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.gaps import Gaps
 from groundstation.base.ledger import Ledger
+from groundstation.base.runways.kept import usable_runways
 from groundstation.base.signals import topics_of_kind
 from groundstation.integrity.ledger import gaps_of
 from groundstation.methods import overview
@@ -167,6 +168,7 @@ def known_of(flight: Flight, configuration: Configuration) -> Known:
     Phases, and all that the user states about it.
     """
     settings = configuration.settings
+    runways, problem = usable_runways()
     known = Known(
         phases=flight_phases(flight),
         aircraft=settings.aircraft,
@@ -175,6 +177,8 @@ def known_of(flight: Flight, configuration: Configuration) -> Known:
         weather=configuration.weather,
         lessons=configuration.lessons,
         roles=systems().roles,
+        runways=runways,
+        runways_problem=problem,
     )
     try:
         return replace(known, intervals=_intervals(flight, configuration))

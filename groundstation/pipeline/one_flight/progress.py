@@ -2,7 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+if TYPE_CHECKING:
+    from groundstation.pipeline.one_flight.outcome import Outcome
 
 EventKind = Literal["begin", "stage", "end"]
 
@@ -20,12 +23,15 @@ class Event:
     text : str
         The stage (``"reading"``) or the result in a few words.
     total : int
+    outcomes : tuple of Outcome
+        What became of the item that ends: one each flight of it.
     """
 
     kind: EventKind
     name: str = ""
     text: str = ""
     total: int = 0
+    outcomes: "tuple[Outcome, ...]" = ()
 
 
 Listener: TypeAlias = Callable[[Event], None]

@@ -21,6 +21,7 @@ from typing import Any, Literal
 from groundstation.base.errors import GroundstationError
 from groundstation.base.failures import is_incomplete
 from groundstation.base.findings import Finding
+from groundstation.base.runways.kept import usable_runways
 from groundstation.base.version import __version__
 from groundstation.pipeline.one_flight.apply import corrected_name
 from groundstation.pipeline.one_flight.configuration import ISOLATION, Configuration
@@ -182,7 +183,11 @@ def keys_of(source: Source, configuration: Configuration, *, digests: Sequence[s
     apply = None if configuration.apply is None else asdict(configuration.apply)
     lessons = [] if configuration.lessons is None else [[asdict(one) for one in configuration.lessons]]
     left_out = [list(configuration.without)] if configuration.without else []
-    analysis = digest_of_parts(conversion, tables, intervals, apply, configuration.weather, *lessons, *left_out)
+    runways, problem = usable_runways()
+    analysis = digest_of_parts(
+        *(conversion, tables, intervals, apply, configuration.weather, *lessons, *left_out),
+        *(runways.digest, bool(problem)),
+    )
     return Keys(conversion, analysis)
 
 

@@ -20,6 +20,8 @@ from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.store.writer import clear_parts
 
+WRITTEN = (".mcap", ".ch10")
+
 
 def convert_many(
     logs: Sequence[Path],
@@ -48,6 +50,8 @@ def convert_many(
             raise UsageError(str(log), "no such file")
         if log.is_dir():
             raise no_log(log)
+    if len(logs) == 1 and not output.is_dir() and output.suffix.lower() not in WRITTEN:
+        raise UsageError(str(output), f"the ending {output.suffix or '(none)'}", "a name *.mcap or *.ch10, or a folder")
     if len(logs) > 1 and output.is_file():
         raise UsageError(str(output), "a file", "a folder for several logs")
     into_folder = len(logs) > 1 or output.is_dir()
@@ -67,7 +71,7 @@ def convert_many(
     for number, outcome in crew(enumerate(jobs), _convert_one):
         if outcome.state == "failed":
             clear_parts(jobs[number].target)
-        listen(Event("end", jobs[number].name, outcome.text))
+        listen(Event("end", jobs[number].name, outcome.text, outcomes=(outcome,)))
         outcomes.append(outcome)
     return tuple(outcomes)
 

@@ -2,14 +2,15 @@
 
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
 from groundstation.pipeline.many_flights.fleet.publishing import FLEET_RECORDING
-from groundstation.pipeline.many_flights.inputs import COMPARISON_RECORDING, file_in
+from groundstation.pipeline.many_flights.inputs import COMPARISON_RECORDING, file_in, is_remote
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job, run_flight
+from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.files import load_manifest
 
 ADDRESSES = ("rerun://", "rerun+http://", "rerun+https://")
@@ -75,6 +76,31 @@ def look_at(
             code = open_viewer(_recording(Path(outcome.folder)), web=web, host=host, port=port, say=say)
     if code:
         raise GroundstationError("the Rerun viewer", f"ended with code {code}; see its output above")
+
+
+def require_recordings_to_open(out: str, *, only_results: bool) -> None:
+    """Refuse ``run --open`` before anything is computed.
+
+    Raises
+    ------
+    UsageError
+        When no recording is made, or the results go elsewhere.
+    GroundstationError
+        When this machine has no display.
+    """
+    from groundstation.viewer.launch import require_display
+
+    if only_results or is_remote(out):
+        raise UsageError("--open", "no recording on this machine", "--open without --only results, and a local folder")
+    require_display(os.environ)
+
+
+def open_results(out: str, outcomes: Sequence[Outcome], *, say: Callable[[str], None]) -> None:
+    """Open the recording of the one flight or session of a run, or that of all of them."""
+    folders = [one.folder for one in outcomes if one.folder and one.flight_id]
+    if folders:
+        place = folders[0] if len(folders) == 1 else out
+        look_at(place, web=False, host="127.0.0.1", port=None, profile=None, say=say)
 
 
 def _sound(recording: Path) -> Path:

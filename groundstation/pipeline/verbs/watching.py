@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from groundstation.base.errors import UsageError
+from groundstation.base.words import counted
 from groundstation.pipeline.many_flights.inputs import collect
 from groundstation.pipeline.many_flights.runs.out_folder import refuse_foreign
 from groundstation.pipeline.one_flight.configuration import Configuration
@@ -115,7 +116,10 @@ def watch(
     batch = WatchedLogs((), out, configuration, fail_on, with_pdf, jobs, stations, force, True, only_results, timeout_s)
     batch = replace(batch, is_isolated=is_isolated)
     watched, trouble = Watched(), _Trouble((lambda _: None) if once else say)
-    watched.ready(_look(folder, out, configuration, trouble))
+    here = _look(folder, out, configuration, trouble)
+    watched.ready(here)
+    if not once and not trouble.told:
+        say(f"watching {folder}: {counted(len(here), 'file')} there now, looked at every {every_s:g} s; Ctrl-C ends")
     while True:
         wait(every_s)
         now = _look(folder, out, configuration, trouble)

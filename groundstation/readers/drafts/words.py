@@ -222,6 +222,8 @@ _FIELDS: tuple[tuple[str, str, str, str, int], ...] = (
     (rf"(?:s|speed|vel|velocity) ?{_SIGMA}|sacc", "gnss", "velocity_sigma_mps", "mps", 1),
     (r"true air ?speed|tas", "air", "true_airspeed_mps", "mps", 1),
     (r"(?:indicated|i|calibrated)? ?air ?speed|ias|cas", "air", "indicated_airspeed_mps", "mps", 1),
+    (r"flaps?(?: angle| position| deflection)?", "configuration", "flap_deg", "deg", 1),
+    (r"(?:landing )?gear down(?: locked)?|gear down and locked", "configuration", "gear_down", "", 1),
     (r"weight on wheels|wow|on ground|onground", "discrete", "weight_on_wheels", "", 1),
     (r"(?:battery |batt? )?(?:current|curr|amps?)", "electric", "current_a", "a", 1),
 )

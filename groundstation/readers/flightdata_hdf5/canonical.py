@@ -16,7 +16,11 @@ from groundstation.base.signals import Field, field_of
 from groundstation.base.units import CONVERSIONS
 from groundstation.readers.flightdata_hdf5.container import Container, Parameter
 
-_UNITS: Mapping[str, str] = {"kts": "kt", "deg/sec": "dps"}  # units as these files write them -> as base.units does
+_UNITS: Mapping[str, str] = {
+    "kts": "kt",
+    "deg/sec": "dps",
+    "%": "percent",
+}  # units as these files write them -> as base.units does
 Way = Literal["plain", "circle", "step"]
 
 
@@ -68,8 +72,19 @@ RULES: Mapping[str, tuple[ParameterRule, ...]] = {
         ParameterRule("Airspeed True", "true_airspeed_mps", "kt"),
     ),
     "discrete": (ParameterRule("Gear On Ground", "weight_on_wheels", "", way="step"),),
+    "configuration": (
+        ParameterRule("Flap", "flap_deg", "deg", way="step"),
+        ParameterRule("Flap (L)", "flap_deg", "deg", way="step"),
+        ParameterRule("Gear Down", "gear_down", "", way="step"),
+        ParameterRule("Gear (N) Down", "gear_nose_down", "", way="step"),
+        ParameterRule("Gear (L) Down", "gear_left_down", "", way="step"),
+        ParameterRule("Gear (R) Down", "gear_right_down", "", way="step"),
+    ),
+    **{f"engine.{n}": (ParameterRule(f"Eng ({n}) N1", "n1_share", "percent"),) for n in range(1, 5)},
 }
 TRACK = "Track True"  # gives the velocities of ins, with Groundspeed
+# They give the wind of ``air``; the direction is the one the wind blows from.
+WIND_FROM, WIND_SPEED = Field("Wind Direction", "deg", is_heading=True), Field("Wind Speed", "mps")
 _SAID: Mapping[str, str] = {
     "Heading True Continuous": "counts on past north: brought into [0, 360)",
     "Heading Continuous": "counts on past north: brought into [0, 360)",
@@ -109,6 +124,18 @@ def feeds_of(container: Container) -> tuple[dict[str, tuple[ParameterFeed, ...]]
         if found:
             feeds[topic] = tuple(found.values())
     return feeds, tuple(remarks)
+
+
+def wind_feeds(container: Container) -> tuple[ParameterFeed, ...]:
+    """The parameters that give the wind, direction then speed; nothing where one lacks."""
+    found = {one.name: one for one in container.parameters if one.name in (WIND_FROM.name, WIND_SPEED.name)}
+    if len(found) < 2:
+        return ()
+    factor = _factor(found[WIND_SPEED.name].unit, "kt")
+    if factor is None or _factor(found[WIND_FROM.name].unit, "deg") != 1.0:
+        return ()
+    direction = ParameterFeed(found[WIND_FROM.name], WIND_FROM, 1.0, "circle")
+    return direction, ParameterFeed(found[WIND_SPEED.name], WIND_SPEED, factor, "plain")
 
 
 def track_feed(container: Container) -> ParameterFeed | None:

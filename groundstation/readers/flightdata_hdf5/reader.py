@@ -16,9 +16,18 @@ from groundstation.base.records import MAX_BATCH_ROWS, Column, Damage, Int64Arra
 from groundstation.base.signals import RAW_PREFIX
 from groundstation.base.source_units import PREFIX, units_entry
 from groundstation.base.units import NS_PER_S
-from groundstation.readers.flightdata_hdf5.canonical import TRACK, ParameterFeed, feeds_of, track_feed, values_at
+from groundstation.readers.flightdata_hdf5.canonical import (
+    TRACK,
+    WIND_FROM,
+    WIND_SPEED,
+    ParameterFeed,
+    feeds_of,
+    track_feed,
+    values_at,
+    wind_feeds,
+)
 from groundstation.readers.flightdata_hdf5.container import FAILURES, HIGHEST_RATE_HZ, Container, Parameter, opened
-from groundstation.readers.layout import velocity_from_track
+from groundstation.readers.layout import velocity_from_track, wind_from_direction
 from groundstation.readers.parts import bounded
 from groundstation.readers.places import nowhere, placed
 from groundstation.readers.source import Source
@@ -59,11 +68,12 @@ def items(source: Source, reader_name: str) -> Iterator[Item]:
         yield LogHeader(reader_name, units, utc_ns, has_counting_clock=True)
         feeds, said = feeds_of(container)
         track = track_feed(container) if any(one.field.name == SPEED for one in feeds.get("ins", ())) else None
+        beside = {"ins": () if track is None else (track,), "air": wind_feeds(container)}
         next_index = 0
         for span in _slices(container.parameters):
             batches = [
                 *_raw_batches(topics, span, losses),
-                *_canonical_batches(feeds, track, span, losses),
+                *_canonical_batches(feeds, beside, span, losses),
             ]
             for batch in batches:
                 steps.see(batch)
@@ -142,13 +152,16 @@ def _raw_batches(topics: dict[str, Parameter], span: Span, losses: _Losses) -> I
 
 
 def _canonical_batches(
-    feeds: dict[str, tuple[ParameterFeed, ...]], track: ParameterFeed | None, span: Span, losses: _Losses
+    feeds: dict[str, tuple[ParameterFeed, ...]],
+    beside: dict[str, tuple[ParameterFeed, ...]],
+    span: Span,
+    losses: _Losses,
 ) -> Iterator[RecordBatch]:
     for topic, several in feeds.items():
         leader = several[0].parameter
         times_ns = leader.times_ns(*_times_in(leader, span))
         columns: dict[str, Column] = {}
-        for feed in (*several, *((track,) if track is not None and topic == "ins" else ())):
+        for feed in (*several, *beside.get(topic, ())):
             try:
                 values, present = values_at(feed, times_ns)
             except FAILURES as error:
@@ -157,6 +170,7 @@ def _canonical_batches(
             is_flag = feed.field.kind == "bool"
             columns[feed.field.name] = Column(values != 0.0 if is_flag else values, present)
         _with_velocities(columns)
+        _with_wind(columns)
         known, zeros = placed(topic, columns)
         if len(zeros):
             losses.nowhere[topic] += len(zeros)
@@ -183,6 +197,16 @@ def _with_velocities(columns: dict[str, Column]) -> None:
     present = track.mask & speed.mask
     north, east = velocity_from_track(track.values, speed.values)
     columns["velocity_north_mps"], columns["velocity_east_mps"] = Column(north, present), Column(east, present)
+
+
+def _with_wind(columns: dict[str, Column]) -> None:
+    """Replace direction and speed of the wind by its velocity."""
+    direction, speed = columns.pop(WIND_FROM.name, None), columns.pop(WIND_SPEED.name, None)
+    if direction is None or speed is None:
+        return
+    present = direction.mask & speed.mask
+    north, east = wind_from_direction(direction.values, speed.values)
+    columns["wind_north_mps"], columns["wind_east_mps"] = Column(north, present), Column(east, present)
 
 
 def _batch(topic: str, times_ns: Int64Array, columns: dict[str, Column]) -> RecordBatch | None:

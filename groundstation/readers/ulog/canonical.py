@@ -192,6 +192,11 @@ def _height(rows: NumericColumns) -> Columns:
     return {"height_m": Column(rows["current_distance"], present)}
 
 
+def _throttle(rows: NumericColumns) -> Columns:
+    """Throttle as the controllers ask for it: group 0, index 3 (msg/actuator_controls.msg, to 1.13)."""
+    return {"throttle_share": Column(rows["control[3]"])}
+
+
 def _landed(rows: NumericColumns) -> Columns:
     landed = holds(rows, "landed")
     return {"weight_on_wheels": Column(landed)} if landed is not None else {}
@@ -310,6 +315,7 @@ ROLES: tuple[Role, ...] = (
         (SourceRule("distance_sensor", ("current_distance", "orientation"), _height),),
         has_instances=True,
     ),
+    Role("engine", (SourceRule("actuator_controls_0", ("control[3]",), _throttle),)),
     Role(
         "discrete",
         (

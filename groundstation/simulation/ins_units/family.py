@@ -21,6 +21,7 @@ from groundstation.simulation.ins_units.settings import (
     UnitDrift,
     UnitExchanged,
     UnitFrozen,
+    UnitHeading,
     UnitOutput,
     UnitReset,
     UnitsSettings,
@@ -43,6 +44,7 @@ SHORTEST_OUTAGE_S, LONGEST_OUTAGE = 300.0, 0.8  # the longest as a share of the 
 COARSE = UnitOutput(
     velocity_step_mps=0.0643, position_step_deg=180.0 / 2**20, heading_step_deg=180.0 / 2**15
 )  # ARINC 429: 1/8 kt, labels 310 and 311, label 314
+OTHER_CLASS = "tactical"
 LATE_CLOCK = UnitClock(unit=1, late_s=0.5)
 
 DrawFault: TypeAlias = Callable[[np.random.Generator, int, UnitsSettings], AnyUnitFault]
@@ -171,6 +173,10 @@ def _frozen(length_s: float) -> DrawFault:
     return draw
 
 
+def _heading(offset_deg: float) -> DrawFault:
+    return lambda rng, unit, _flight: UnitHeading(unit=unit, offset_deg=offset_deg * float(rng.choice((-1.0, 1.0))))
+
+
 def _twin(_rng: np.random.Generator, unit: int, _flight: UnitsSettings) -> AnyUnitFault:
     return UnitTwin(unit=unit, of=1 if unit != 1 else 2)
 
@@ -184,6 +190,7 @@ FAULT_CASES: tuple[FaultCase, ...] = (
     FaultCase("swapped", "", lambda _rng, unit, _flight: UnitSwapped(unit=unit)),
     *(FaultCase("stuck", f"{length_s:g} s", _stuck(length_s)) for length_s in (60.0, 300.0, 1200.0)),
     *(FaultCase("frozen", f"{length_s:g} s", _frozen(length_s)) for length_s in (60.0, 300.0)),
+    *(FaultCase("heading", f"{offset:g} deg", _heading(offset)) for offset in (0.2, 0.5, 2.0)),
 )
 BAD_INPUTS: tuple[FaultCase, ...] = (
     FaultCase("clock", "0.5 s", lambda _rng, unit, _flight: UnitClock(unit=unit, late_s=0.5), is_fault=False),
@@ -211,5 +218,6 @@ BROKEN: Mapping[str, Callable[[UnitsSettings], UnitsSettings]] = MappingProxyTyp
         "anomalies": lambda flight: replace(flight, common=CommonErrors(deflection_arcsec=20.0, deflection_km=20.0)),
         "heavy_tails": lambda flight: replace(flight, common=CommonErrors(heavy_tail_freedom=3)),
         "clocks": _late_but_the_first,
+        "two_classes": lambda flight: replace(flight, ins_of_others=OTHER_CLASS),
     }
 )

@@ -132,21 +132,20 @@ def _with_gusts(route: Route, gust_mps: float, rng: np.random.Generator) -> Rout
 def _errors_of(settings: UnitsSettings, truth: Route, number: int, streams: _Streams) -> UnitErrors:
     """Return the errors of a unit along the flight, with the faults that change them."""
     faults = [one for one in settings.faults if one.unit == number]
+    kind = settings.class_of(number)
 
     def draw(label: str) -> UnitErrors:
         own = streams.of_unit(label)
-        ins = _instrument(settings, own)
-        sensors = _sensors(settings, ins, truth, own, streams)
+        ins = _instrument(settings, kind, own)
+        sensors = _sensors(settings, ins, kind, truth, own, streams)
         if label == str(number):
             for fault in faults:
                 if isinstance(fault, UnitDrift):
-                    sensors = _drifting(sensors, fault, settings.ins_class, truth.motion.time_s)
+                    sensors = _drifting(sensors, fault, kind, truth.motion.time_s)
                 elif isinstance(fault, UnitTilt):
-                    sensors = _tilted(sensors, fault.times, fault.direction_deg, settings.ins_class)
+                    sensors = _tilted(sensors, fault.times, fault.direction_deg, kind)
         found = propagate(truth.motion, sensors, body_fixed=ins.is_strapdown)
-        wander = draw_heading_wander(
-            own("heading"), truth.motion.time_s, truth.motion.heading_deg[0], settings.ins_class.heading
-        )
+        wander = draw_heading_wander(own("heading"), truth.motion.time_s, truth.motion.heading_deg[0], kind.heading)
         return UnitErrors(
             found.position_m[0],
             found.velocity_mps[0],
@@ -155,14 +154,12 @@ def _errors_of(settings: UnitsSettings, truth: Route, number: int, streams: _Str
         )
 
     outages = [(one.from_s, one.to_s) for one in settings.outages] if settings.has_gnss else []
-    return with_error_faults(
-        draw(str(number)), faults, truth.motion, settings.ins_class, outages, draw, streams.of_unit(str(number))
-    )
+    return with_error_faults(draw(str(number)), faults, truth.motion, kind, outages, draw, streams.of_unit(str(number)))
 
 
-def _instrument(settings: UnitsSettings, own: Callable[[str], np.random.Generator]) -> InsClass:
+def _instrument(settings: UnitsSettings, kind: InsClass, own: Callable[[str], np.random.Generator]) -> InsClass:
     """Return the instrument of one unit: its class, or one of its own."""
-    ins, common = settings.ins_class, settings.common
+    ins, common = kind, settings.common
     if settings.each_its_own:
         ins = draw_instrument(ins, own("instrument"))
     if common.heavy_tail_freedom:
@@ -178,7 +175,9 @@ def _instrument(settings: UnitsSettings, own: Callable[[str], np.random.Generato
     return ins
 
 
-def _sensors(settings: UnitsSettings, ins: InsClass, truth: Route, own: _Streams, streams: _Streams) -> SensorErrors:
+def _sensors(
+    settings: UnitsSettings, ins: InsClass, kind: InsClass, truth: Route, own: _Streams, streams: _Streams
+) -> SensorErrors:
     """Draw the sensors and the alignment of one unit, and what all units share of it."""
     sensors = draw_sensor_errors(ins, truth.motion, own, body_fixed=ins.is_strapdown)
     shared = streams("alignment")
@@ -189,7 +188,7 @@ def _sensors(settings: UnitsSettings, ins: InsClass, truth: Route, own: _Streams
         position_m=settings.ins_class.initial_position_m * position,
         azimuth_rad=sensors.azimuth_rad + np.deg2rad(common.azimuth_deg),
     )
-    return _tilted(sensors, common.tilt_times, direction_deg, settings.ins_class) if common.tilt_times else sensors
+    return _tilted(sensors, common.tilt_times, direction_deg, kind) if common.tilt_times else sensors
 
 
 def class_tilt_rad(ins: InsClass) -> float:

@@ -105,6 +105,8 @@ def _metadata(flight: UnitsFlight, scenario: UnitsScenario, start_ns: int) -> di
     found = {"aircraft": scenario.aircraft, "flight": scenario.name, "start_utc": _iso(start_ns)}
     if isinstance(flight.settings.ins, str):
         found["ins_class"] = flight.settings.ins
+    if flight.settings.ins_of_others:
+        found |= {f"ins_class.{unit.topic}": flight.settings.ins_of_others for unit in flight.units[1:]}
     stated = dict(zip((unit.topic for unit in flight.units), scenario.serials, strict=False))
     for unit in flight.units:
         (_from_s, first), *later = unit.serials

@@ -76,4 +76,6 @@ def load_units_scenario(name_or_path: str | Path) -> UnitsScenario:
     scenario = settings_from(UnitsScenario, table, file.where)
     if isinstance(scenario.flown.ins, str):
         load_ins_class(scenario.flown.ins)
+    if scenario.flown.ins_of_others:
+        load_ins_class(scenario.flown.ins_of_others)
     return scenario

@@ -92,6 +92,14 @@ class UnitFrozen(UnitFault):
 
 
 @dataclass(frozen=True)
+class UnitHeading(UnitFault):
+    """Constant added to the heading that a unit writes, as of one aligned or mounted askew."""
+
+    kind: ClassVar[str] = "heading"
+    offset_deg: float = number(1.0, -180.0, 180.0)
+
+
+@dataclass(frozen=True)
 class UnitClock(UnitFault):
     """Stamps of a unit that are late, and run fast or slow."""
 
@@ -142,6 +150,7 @@ AnyUnitFault: TypeAlias = (
     | UnitSwapped
     | UnitStuck
     | UnitFrozen
+    | UnitHeading
     | UnitClock
     | UnitWithoutPosition
     | UnitAided
@@ -199,7 +208,9 @@ class UnitsSettings:
     ----------
     units : int
     ins : str or InsClass
-        Class of all units.
+        Class of the units.
+    ins_of_others : str
+        Class of all units but the first where it is another one; the log states it of each.
     each_its_own : bool
         Each unit is an instrument of its own (:func:`groundstation.simulation.ins_class.draw_instrument`).
     gnss : GnssErrorModel
@@ -216,6 +227,7 @@ class UnitsSettings:
 
     units: int = number(2, 1, MOST_UNITS)
     ins: str | InsClass = "navigation"
+    ins_of_others: str = ""
     route: RouteKind = "straight"
     duration_s: float = number(7200.0, 600.0, 50_000.0)
     step_s: float = number(1.0, 0.1, 10.0)
@@ -251,3 +263,7 @@ class UnitsSettings:
     def ins_class(self) -> InsClass:
         """The class itself."""
         return load_ins_class(self.ins) if isinstance(self.ins, str) else self.ins
+
+    def class_of(self, unit: int) -> InsClass:
+        """Return the class of a unit."""
+        return load_ins_class(self.ins_of_others) if self.ins_of_others and unit > 1 else self.ins_class

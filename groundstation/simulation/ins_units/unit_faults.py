@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.base.angles import FloatArray
+from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.base.records import frozen
 from groundstation.simulation.ins_class import InsClass
 from groundstation.simulation.ins_draw import Streams, draw_sensor_errors
@@ -17,6 +17,7 @@ from groundstation.simulation.ins_units.settings import (
     UnitClock,
     UnitExchanged,
     UnitFrozen,
+    UnitHeading,
     UnitReset,
     UnitStep,
     UnitStuck,
@@ -238,6 +239,8 @@ def with_output_faults(record: UnitRecord, faults: Iterable[AnyUnitFault]) -> Un
                 }
                 velocity = _held(record.velocity_mps, time_s, fault, [0, 1])
                 record = replace(record, velocity_mps=velocity, **parts)
+            case UnitHeading():
+                record = replace(record, heading_deg=wrap_360(record.heading_deg + fault.offset_deg))
             case UnitClock():
                 record = replace(record, stamp_s=record.stamp_s * (1.0 + 1e-6 * fault.rate_ppm) + fault.late_s)
             case UnitWithoutPosition():

@@ -17,6 +17,7 @@ from groundstation.systems.inertial.units_answer import (
 from groundstation.systems.inertial.units_compare import Judged, against_reference, in_pairs
 from groundstation.systems.inertial.units_figures import figures_of
 from groundstation.systems.inertial.units_growth import Noise
+from groundstation.systems.inertial.units_heading import heading_faults
 from groundstation.systems.inertial.units_limits import limits_of, share_of_limits
 from groundstation.systems.inertial.units_prepare import Comparable, Prepared, prepare
 from groundstation.systems.inertial.units_track import ReferenceTrack, UnitTrack
@@ -43,8 +44,8 @@ def judge_units(
     reference : ReferenceTrack, optional
         GNSS or the best trajectory; it may have gaps.
     ins_class : str
-        Class whose simulated units are the reference distribution of what honest units do; limits are those of the
-        class navigation where it was not simulated.
+        Class whose simulated units are the reference distribution of what honest units do, for units that state none of
+        their own; limits are those of the class navigation where it was not simulated.
     ins_class_origin : str
         Who chose it.
 
@@ -66,13 +67,14 @@ def judge_units(
     together_s = _longest_together_s(tracks)
     if together_s < LEAST_S:
         raise NotAssessableError("ins_units", f"{together_s:.0f} s of two INS together", f"at least {LEAST_S:.0f} s")
-    limits_class = ins_class if limits_of(ins_class, 1.0, is_start_known=True) is not None else DEFAULT_LIMITS
+    limits_class = _limits_class(ins_class)
+    classes = {one.topic: _limits_class(one.ins_class) if one.ins_class else limits_class for one in tracks}
     found = prepare(tracks, reference)
-    by_reference = against_reference(found, _noise(reference), limits_class)
-    pairs = in_pairs(found, limits_class)
+    by_reference = against_reference(found, _noise(reference), classes)
+    pairs = in_pairs(found, classes)
     if all(one.shown is None for one in (*pairs, *by_reference.values())):
         raise NotAssessableError("ins_units", "no two INS with values at the same time")
-    faults = own_faults(found, reference) + growth_faults(found, by_reference, pairs, reference)
+    faults = own_faults(found, reference) + growth_faults(found, by_reference, pairs, reference) + heading_faults(pairs)
     judged = sum(bool(one.ratios) for one in pairs)
     states = _states(found, faults, by_reference, pairs)
     common = is_common(by_reference, pairs)
@@ -81,7 +83,9 @@ def judge_units(
         sentence=sentence_of(faults, by_reference, judged, reference, common=common),
         is_common=common,
         off=tuple(topic for topic, state in states.items() if state in ("off", "one_of")),
-        units=tuple(_unit(one, states[one.topic], by_reference.get(one.topic)) for one in found.units),
+        units=tuple(
+            _unit(one, states[one.topic], by_reference.get(one.topic), classes[one.topic]) for one in found.units
+        ),
         pairs=tuple(_told(found, pair) for pair in pairs),
         faults=tuple(faults),
         against="" if reference is None else reference.topic,
@@ -91,6 +95,11 @@ def judge_units(
         false_alarm_share=share_of_limits(),
         figures=figures_of(found),
     )
+
+
+def _limits_class(ins_class: str) -> str:
+    """Return the class itself where it has limits."""
+    return ins_class if limits_of(ins_class, 1.0, is_start_known=True) is not None else DEFAULT_LIMITS
 
 
 def _longest_together_s(tracks: Sequence[UnitTrack]) -> float:
@@ -146,7 +155,7 @@ def _verdict(faults: Sequence[InsFault], states: Mapping[str, UnitState]) -> Ver
     return "agree" if "good" in states.values() else "not_judged"
 
 
-def _unit(one: Prepared, state: UnitState, judged: Judged | None) -> InsUnit:
+def _unit(one: Prepared, state: UnitState, judged: Judged | None, ins_class: str) -> InsUnit:
     growth = None if judged is None else judged.shown
     track = one.track
     return InsUnit(
@@ -167,9 +176,10 @@ def _unit(one: Prepared, state: UnitState, judged: Judged | None) -> InsUnit:
         largest_at_s=None
         if growth is None or growth.largest_at_s is None
         else growth.largest_at_s + (track.start_s or 0.0),
-        heading_difference_deg=None if judged is None else judged.heading_deg,
+        heading_difference_deg=None if judged is None else judged.against_deg,
         lag_s=one.late_s,
         same_as=one.same_as,
+        ins_class=ins_class,
     )
 
 
@@ -180,14 +190,16 @@ def _told(found: Comparable, pair: Judged) -> InsPair:
         first=first.topic,
         second=second.topic,
         hours=0.0 if growth is None else growth.hours,
-        rate_fit_nmiph=None if growth is None or growth.rate_nmiph is None else growth.rate_nmiph.value,
-        velocity_rms_mps=None if growth is None or growth.velocity_mps is None else growth.velocity_mps.value,
-        schuler_mps=None if growth is None or growth.schuler_mps is None else growth.schuler_mps.value,
-        largest_m=None if growth is None or growth.largest_m is None else growth.largest_m.value,
-        heading_difference_deg=pair.heading_deg,
+        rate_fit_nmiph=size_of(growth, "rate_nmiph"),
+        velocity_rms_mps=size_of(growth, "velocity_mps"),
+        schuler_mps=size_of(growth, "schuler_mps"),
+        largest_m=size_of(growth, "largest_m"),
+        heading_difference_deg=pair.heading,
+        is_start_known=pair.is_start_known,
         rate_limit_nmiph=None if limits is None else limits.rate_nmiph,
         velocity_limit_mps=None if limits is None else limits.velocity_mps,
-        is_beyond=pair.is_beyond,
+        heading_limit_deg=None if limits is None or pair.heading is None else limits.heading_deg,
+        is_beyond=pair.is_beyond or (pair.heading_over or 0.0) > 1.0,
         why_not=_why_not(first, second) if not pair.ratios else "",
     )
 

@@ -7,11 +7,11 @@ from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 
 UnitState = Literal["good", "off", "one_of", "aided", "copy", "not_judged"]
-FaultKind = Literal["drift", "tilt", "step", "swapped_axis", "stuck", "frozen"]
+FaultKind = Literal["drift", "tilt", "step", "swapped_axis", "stuck", "frozen", "heading"]
 Verdict = Literal["agree", "off", "one_of", "not_judged"]
 UNIT_STATES: tuple[str, ...] = ("good", "off", "one_of", "aided", "copy", "not_judged")
 SAME_HEADING_DEG = 0.5  # between two records of one unit
-FAULT_KINDS: tuple[str, ...] = ("drift", "tilt", "step", "swapped_axis", "stuck", "frozen")
+FAULT_KINDS: tuple[str, ...] = ("drift", "tilt", "step", "swapped_axis", "stuck", "frozen", "heading")
 VERDICTS: tuple[str, ...] = ("agree", "off", "one_of", "not_judged")
 
 
@@ -41,7 +41,7 @@ class InsFault:
         Flight seconds of a fault that has a place.
     value, half95, unit
         Size, with half of its 95 % interval where it has one: nmi/h of a drift, m/s of a tilt (Schuler amplitude), m or
-        m/s of a step; None where the kind has no size.
+        m/s of a step, deg of a heading; None where the kind has no size.
     limit : float or None
         Exceeded by an honest unit of the class in :attr:`UnitsResult.false_alarm_share` of flights.
     by : str
@@ -94,6 +94,8 @@ class InsUnit:
         Time by which its clock is behind that of the first unit; taken off before the comparison.
     same_as : str
         Topic of the unit whose numbers it repeats.
+    ins_class : str
+        Class of its limits.
     state : str
         ``off``: named as faulty; ``one_of``: it or another; ``aided``: GNSS corrects it, so it is no witness;
         ``copy``: it repeats another.
@@ -119,14 +121,16 @@ class InsUnit:
     heading_difference_deg: float | None = None
     lag_s: Measured | None = None
     same_as: str = ""
+    ins_class: str = ""
 
 
 @dataclass(frozen=True)
 class InsPair:
     """Second unit less the first one.
 
-    ``rate_limit_nmiph`` and ``velocity_limit_mps`` are what two honest units of the class exceed in
-    :attr:`UnitsResult.false_alarm_share` of flights; None where the pair is not judged, ``why_not`` says why.
+    The intervals are those of what both units write: rounding and noise. The limits are what two honest units of their
+    classes exceed in :attr:`UnitsResult.false_alarm_share` of flights; None where the pair is not judged, ``why_not``
+    says why. Without ``is_start_known`` the rate is the growth inside the log.
     """
 
     schema_name: ClassVar[str] = "ins_pair"
@@ -134,13 +138,15 @@ class InsPair:
     first: str
     second: str
     hours: float
-    rate_fit_nmiph: float | None
-    velocity_rms_mps: float | None
-    schuler_mps: float | None
-    largest_m: float | None
-    heading_difference_deg: float | None
+    rate_fit_nmiph: Measured | None
+    velocity_rms_mps: Measured | None
+    schuler_mps: Measured | None
+    largest_m: Measured | None
+    heading_difference_deg: Measured | None
+    is_start_known: bool = False
     rate_limit_nmiph: float | None = None
     velocity_limit_mps: float | None = None
+    heading_limit_deg: float | None = None
     is_beyond: bool = False
     why_not: str = ""
 
@@ -192,8 +198,8 @@ class UnitsResult(Answer):
         both = {unit.topic, unit.same_as}
         apart = next((one.heading_difference_deg for one in self.pairs if {one.first, one.second} == both), None)
         found = []
-        if apart is not None and abs(apart) > SAME_HEADING_DEG:
-            found.append(f"its heading stands {abs(apart):.1f} deg apart")
+        if apart is not None and abs(apart.value) > SAME_HEADING_DEG:
+            found.append(f"its heading stands {abs(apart.value):.1f} deg apart")
         serials = unit.serials, self.unit(unit.same_as).serials
         if all(serials) and not set(serials[0]) & set(serials[1]):
             found.append(f"it states another serial ({', '.join(serials[0])}, {', '.join(serials[1])})")

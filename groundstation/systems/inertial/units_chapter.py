@@ -82,12 +82,12 @@ def _remarks(answer: UnitsResult) -> list[Note]:
     return notes
 
 
-def _measured(value: Measured | None, places: int, unit: str = "") -> str:
+def _measured(value: Measured | None, places: int, unit: str = "", *, signed: bool = False) -> str:
     if value is None:
         return ABSENT
     half = f" ± {number(value.half95, places)}" if value.half95 >= 0.5 * 10.0**-places else ""
     tail = f" {unit}" if unit else ""
-    return f"{number(value.value, places)}{half}{tail}"
+    return f"{number(value.value, places, signed=signed)}{half}{tail}"
 
 
 def _table(answer: UnitsResult) -> Grid:
@@ -156,13 +156,26 @@ def _grid(title: str, columns: Sequence[tuple[Head, Callable[[Any], Cell]]], row
 
 
 def _pairs(answer: UnitsResult) -> Grid:
-    origin = f" ({answer.ins_class_origin})" if answer.ins_class_origin else ""
     caption = (
-        f"Limits: what two honest units of the class {answer.ins_class}{origin} exceed in "
+        f"Limits: what two honest units of the {_classes(answer)} exceed in "
         f"{percent(answer.false_alarm_share, 1)} of simulated flights of this length, Schuler oscillation and all; "
-        "steps and outputs that stand still are taken out before."
+        "steps and outputs that stand still are taken out before. ± is what rounding and noise of both outputs do; "
+        "rates marked * are the growth inside the log."
     )
     return _grid("Pairs", PAIR_COLUMNS, answer.pairs, caption)
+
+
+def _classes(answer: UnitsResult) -> str:
+    names = list(dict.fromkeys(unit.ins_class for unit in answer.units if unit.ins_class))
+    if len(names) > 1:
+        return f"classes {listed(names)} (each its own)"
+    origin = f" ({answer.ins_class_origin})" if answer.ins_class_origin else ""
+    return f"class {answer.ins_class}{origin}"
+
+
+def _pair_rate(pair: InsPair) -> Cell:
+    rate = _measured(pair.rate_fit_nmiph, 2)
+    return rate if pair.is_start_known or rate == ABSENT else f"{rate} *"
 
 
 def _pair_state(pair: InsPair) -> Cell:
@@ -176,11 +189,12 @@ PAIR_COLUMNS: tuple[tuple[Head, Callable[[InsPair], Cell]], ...] = (
     (Head("Pair"), lambda pair: f"{pair.second} − {pair.first}"),
     (Head(""), _pair_state),
     (Head("Hours", True), lambda pair: number(pair.hours, 2)),
-    (Head("Rate, nmi/h", True), lambda pair: number(pair.rate_fit_nmiph, 2)),
+    (Head("Rate, nmi/h", True), _pair_rate),
     (Head("Limit", True), lambda pair: number(pair.rate_limit_nmiph, 2)),
-    (Head("Velocity RMS, m/s", True), lambda pair: number(pair.velocity_rms_mps, 2)),
+    (Head("Velocity RMS, m/s", True), lambda pair: _measured(pair.velocity_rms_mps, 2)),
     (Head("Limit", True), lambda pair: number(pair.velocity_limit_mps, 2)),
-    (Head("Schuler amplitude, m/s", True), lambda pair: number(pair.schuler_mps, 2)),
-    (Head("Largest distance, m", True), lambda pair: number(pair.largest_m, 0)),
-    (Head("Heading, °", True), lambda pair: number(pair.heading_difference_deg, 2, signed=True)),
+    (Head("Schuler amplitude, m/s", True), lambda pair: _measured(pair.schuler_mps, 2)),
+    (Head("Largest distance, m", True), lambda pair: _measured(pair.largest_m, 0)),
+    (Head("Heading, °", True), lambda pair: _measured(pair.heading_difference_deg, 2, signed=True)),
+    (Head("Limit", True), lambda pair: number(pair.heading_limit_deg, 2)),
 )

@@ -1,6 +1,6 @@
 """Growth of each unit and each pair beside the limits of honest units."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -8,9 +8,11 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray
+from groundstation.systems.inertial.units_answer import Measured
 from groundstation.systems.inertial.units_grid import OnGrid, apart_m, heading_apart_deg
-from groundstation.systems.inertial.units_growth import NO_NOISE, Growth, Noise, growth_of
-from groundstation.systems.inertial.units_limits import ClassLimits, GrowthLimits, limits_of
+from groundstation.systems.inertial.units_growth import Growth, Noise, growth_of
+from groundstation.systems.inertial.units_limits import GrowthLimits, limits_of, pair_limits_of
+from groundstation.systems.inertial.units_noise import heading_apart, pair_noise
 from groundstation.systems.inertial.units_prepare import Comparable, Prepared
 
 STAND_MPS, STAND_S = 3.0, 5.0  # a log that begins at a standstill
@@ -23,15 +25,17 @@ class Judged:
     """Growth of a difference beside the limits that it is held against.
 
     ``shown`` is the growth of what was logged, ``growth`` with steps and held outputs taken out; ``over`` how many
-    times the limit it is at most, 0 where it is not judged.
+    times the limit it is at most, 0 where it is not judged. ``heading`` is the difference of the headings of a pair,
+    ``against_deg`` that of a unit less the reference.
     """
 
     topics: tuple[str, ...]
     shown: Growth | None
     growth: Growth | None
     limits: GrowthLimits | None
-    heading_deg: float | None
     is_start_known: bool
+    heading: Measured | None = None
+    against_deg: float | None = None
 
     @property
     def over(self) -> float:
@@ -50,16 +54,23 @@ class Judged:
         return tuple(found.value / limit for found, limit in pairs if found is not None)
 
     @property
+    def heading_over(self) -> float | None:
+        """Ratio of the heading difference of a pair to its limit, None where it is not judged."""
+        if self.heading is None or self.limits is None:
+            return None
+        return abs(self.heading.value) / self.limits.heading_deg
+
+    @property
     def is_beyond(self) -> bool:
-        """Tell whether a limit is exceeded."""
+        """Tell whether a limit of growth is exceeded."""
         return self.over > 1.0
 
 
-def against_reference(found: Comparable, noise: Noise, ins_class: str) -> dict[str, Judged]:
-    """Return each unit against the reference, by topic."""
+def against_reference(found: Comparable, noise: Noise, classes: Mapping[str, str]) -> dict[str, Judged]:
+    """Return each unit against the reference, by topic; ``classes`` are those of their limits."""
     if found.reference is None:
         return {}
-    return {one.topic: _against(found, one, found.reference, noise, ins_class) for one in found.units}
+    return {one.topic: _against(found, one, found.reference, noise, classes[one.topic]) for one in found.units}
 
 
 def _against(found: Comparable, one: Prepared, reference: OnGrid, noise: Noise, ins_class: str) -> Judged:
@@ -68,7 +79,7 @@ def _against(found: Comparable, one: Prepared, reference: OnGrid, noise: Noise, 
     velocity = one.raw.velocity_mps - reference.velocity_mps
     begun_s = _first_s(found.time_s, apart, velocity) if start_s is None else start_s
     if begun_s is None:
-        return Judged((one.topic,), None, None, None, None, start_s is not None)
+        return Judged((one.topic,), None, None, None, start_s is not None)
     elapsed = found.time_s - begun_s
     set_s = tuple(
         float(step.jump.time_s - begun_s)
@@ -79,33 +90,38 @@ def _against(found: Comparable, one: Prepared, reference: OnGrid, noise: Noise, 
     shown = growth_of(elapsed, apart, velocity, noise, from_first=not is_known, reset_s=set_s)
     place, speed = _unbroken(one.apart_m(reference), one.clean.velocity_mps - reference.velocity_mps, one.unbroken)
     growth = growth_of(elapsed, place, speed, noise, from_first=not is_known)
-    limits = _limits(one.is_witness, growth, ins_class, is_known)
-    heading = heading_apart_deg(one.raw, reference)
-    return Judged((one.topic,), shown, growth, None if limits is None else limits.single, heading, is_known)
+    found_limits = None if growth is None else limits_of(ins_class, growth.hours, is_start_known=is_known)
+    limits = found_limits.single if found_limits is not None and one.is_witness else None
+    return Judged((one.topic,), shown, growth, limits, is_known, against_deg=heading_apart_deg(one.raw, reference))
 
 
-def in_pairs(found: Comparable, ins_class: str) -> tuple[Judged, ...]:
+def in_pairs(found: Comparable, classes: Mapping[str, str]) -> tuple[Judged, ...]:
     """Return every two units, the second less the first."""
-    return tuple(_pair(found, first, second, ins_class) for first, second in combinations(found.units, 2))
+    return tuple(_pair(found, first, second, classes) for first, second in combinations(found.units, 2))
 
 
-def _pair(found: Comparable, first: Prepared, second: Prepared, ins_class: str) -> Judged:
+def _pair(found: Comparable, first: Prepared, second: Prepared, classes: Mapping[str, str]) -> Judged:
     topics = (first.topic, second.topic)
     apart = apart_m(second.raw, first.raw)
     velocity = second.raw.velocity_mps - first.raw.velocity_mps
     begun_s = _first_s(found.time_s, apart, velocity)
     if begun_s is None:
-        return Judged(topics, None, None, None, None, is_start_known=False)
+        return Judged(topics, None, None, None, is_start_known=False)
     start_s = pair_start_s(found.time_s, first, second, apart, begun_s)
     is_known = start_s is not None
     elapsed = found.time_s - (begun_s if start_s is None else start_s)
-    shown = growth_of(elapsed, apart, velocity, from_first=not is_known)
+    grids = first.raw, second.raw
+    noise = pair_noise(first.track, second.track, grids)
+    shown = growth_of(elapsed, apart, velocity, noise, from_first=not is_known)
     unbroken = first.unbroken & second.unbroken
     place, speed = _unbroken(second.apart_m(first), second.clean.velocity_mps - first.clean.velocity_mps, unbroken)
-    growth = growth_of(elapsed, place, speed, NO_NOISE, from_first=not is_known)
-    limits = _limits(first.is_witness and second.is_witness, growth, ins_class, is_known)
-    heading = heading_apart_deg(second.raw, first.raw)
-    return Judged(topics, shown, growth, None if limits is None else limits.pair, heading, is_known)
+    growth = growth_of(elapsed, place, speed, noise, from_first=not is_known)
+    limits = None
+    if growth is not None and first.is_witness and second.is_witness:
+        both = classes[first.topic], classes[second.topic]
+        limits = pair_limits_of(both, growth.hours, is_start_known=is_known)
+    heading = heading_apart(first.track, second.track, grids)
+    return Judged(topics, shown, growth, limits, is_known, heading)
 
 
 def _first_s(time_s: FloatArray, apart: FloatArray, velocity: FloatArray) -> float | None:
@@ -116,12 +132,6 @@ def _first_s(time_s: FloatArray, apart: FloatArray, velocity: FloatArray) -> flo
 def _unbroken(apart: FloatArray, velocity: FloatArray, rows: BoolArray) -> tuple[FloatArray, FloatArray]:
     keep = rows[:, None]
     return np.where(keep, apart, np.nan), np.where(keep, velocity, np.nan)
-
-
-def _limits(is_judged: bool, growth: Growth | None, ins_class: str, is_known: bool) -> ClassLimits | None:
-    if not is_judged or growth is None:
-        return None
-    return limits_of(ins_class, growth.hours, is_start_known=is_known)
 
 
 def pair_start_s(

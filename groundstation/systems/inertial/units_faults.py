@@ -278,7 +278,12 @@ def _usual_change(level: FloatArray, left: FloatArray, large: BoolArray, *, sums
     rows = [row for row in range(NEAR, len(left) - NEAR, NEAR // 2) if known[row - NEAR : row + NEAR].all()]
     if not rows:  # gaps everywhere: as of a random walk
         return float(np.sqrt(NEAR * np.nanmean(np.square(left[~large]))))
-    changes = np.array([_change(level, left, row, sums=sums) for row in rows])
+    sides = np.arange(-NEAR, -ASIDE), np.arange(ASIDE, NEAR)
+    before, after = (np.array(rows)[:, None] + side for side in sides)
+    changes = level[after].mean(axis=1) - level[before].mean(axis=1)
+    if not sums:
+        usual = np.median(left[np.concatenate([before, after], axis=1)], axis=1)
+        changes -= usual * (sides[1].mean() - sides[0].mean())
     return float(np.sqrt(np.mean(np.square(changes))))
 
 

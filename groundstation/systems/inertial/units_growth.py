@@ -139,7 +139,7 @@ def _of_position(
     largest = int(np.argmax(radial))
     found: dict[str, object] = {
         "rate_nmiph": Measured(rate, float(NORMAL_95 * sigma)),
-        "largest_m": Measured(float(radial[largest]), NORMAL_95 * noise.position_m * np.sqrt(1.0 + from_first)),
+        "largest_m": Measured(float(radial[largest]), NORMAL_95 * noise.position_m * (1.0 + from_first) ** 0.5),
         "largest_at_s": float(time_s[largest]),
     }
     late = since_s > RATE_FROM_S

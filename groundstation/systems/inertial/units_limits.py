@@ -67,6 +67,30 @@ def limits_of(ins_class: str, hours: float, *, is_start_known: bool) -> ClassLim
     return ClassLimits(ins_class, float(table["false_alarm_share"]), single, pair)
 
 
+def pair_limits_of(classes: tuple[str, str], hours: float, *, is_start_known: bool) -> GrowthLimits | None:
+    """Return the limits of the difference of two units; None where a class is unknown.
+
+    Of two classes the variances add: the limit is the root of the mean square of those of each class with itself.
+
+    Examples
+    --------
+    >>> one, other = (limits_of(name, 2.0, is_start_known=True).pair for name in ("navigation", "tactical"))
+    >>> both = pair_limits_of(("navigation", "tactical"), 2.0, is_start_known=True)
+    >>> round(both.rate_nmiph, 1), round(other.rate_nmiph / 2**0.5, 1), one.rate_nmiph < 3.0
+    (155.5, 155.5, True)
+    """
+    found = [limits_of(name, hours, is_start_known=is_start_known) for name in classes]
+    pairs = [one.pair for one in found if one is not None]
+    if len(pairs) < len(classes):
+        return None
+    return GrowthLimits(
+        *(
+            float(np.sqrt(np.mean([getattr(one, name) ** 2 for one in pairs])))
+            for name in ("rate_nmiph", "velocity_mps", "heading_deg")
+        )
+    )
+
+
 def share_of_limits() -> float:
     """Return the share of flights of honest units in which a single limit is exceeded."""
     return float(_table()["false_alarm_share"])

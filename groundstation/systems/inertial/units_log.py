@@ -9,7 +9,7 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import topics_of_kind
-from groundstation.methods.ins_noise import InsNoise, choose_class
+from groundstation.methods.ins_noise import InsNoise, choose_class, class_names
 from groundstation.results.arrays.states import BodyStates
 from groundstation.results.roles import StatesAlongTheFlight
 from groundstation.systems.inertial.differences import POSITION_FIELDS, VELOCITY_FIELDS, differences, navigating
@@ -79,7 +79,16 @@ def _track(
         kind_reason=reason,
         serials=serials_of(_serial_text(flight, topic, known, is_first=is_first)),
         start_s=start_s,
+        ins_class=_class_of(flight, topic, settings, is_first=is_first),
     )
+
+
+def _class_of(flight: Flight, topic: str, settings: InertialSettings, *, is_first: bool) -> str:
+    """Return the class that the log states of a unit alone; settings go before it."""
+    if is_first or settings.ins_class != "auto":
+        return ""
+    said = flight.metadata.get(f"ins_class.{topic}", "").strip().lower()
+    return said if said in class_names() else ""
 
 
 def _altitude(table: Table) -> FloatArray | None:

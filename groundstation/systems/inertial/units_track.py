@@ -36,6 +36,8 @@ class UnitTrack(_Frozen):
         Flight seconds from which each serial holds.
     start_s : float or None
         Start of navigation, flight seconds; None where nothing proves it.
+    ins_class : str
+        Class that is stated of this unit; empty where it is that of the flight.
     """
 
     topic: str
@@ -49,6 +51,7 @@ class UnitTrack(_Frozen):
     kind_reason: str = ""
     serials: tuple[tuple[float, str], ...] = ()
     start_s: float | None = None
+    ins_class: str = ""
 
 
 @dataclass(frozen=True)

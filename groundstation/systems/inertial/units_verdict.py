@@ -2,17 +2,15 @@
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from groundstation.base.words import clock_text, listed
 from groundstation.systems.inertial.units_answer import FaultKind, InsFault, Measured
 from groundstation.systems.inertial.units_compare import Judged, beyond
 from groundstation.systems.inertial.units_faults import AXES, axes_in_words
 from groundstation.systems.inertial.units_growth import Growth
+from groundstation.systems.inertial.units_parity import by_parity, in_words
 from groundstation.systems.inertial.units_prepare import Comparable, Prepared, Stepped
 from groundstation.systems.inertial.units_track import ReferenceTrack
 
-CLEARLY_MORE = 2.0  # times as far over its limits as the others' pairs, for parity to name a unit
 AGREE = 0.5  # of what they are over their limits against the reference: units that agree with each other
 COVERS = 0.8  # of the hours of a pair that the reference must cover to acquit both
 COMMON = "all are beyond their limits and agree with each other: the reference, or what they share, is wrong"
@@ -85,14 +83,10 @@ def growth_faults(
     if not left:
         return faults
     topics = [one.topic for one in found.witnesses if one.topic not in named]
-    who = _by_parity(topics, pairs) if len(topics) > 2 else tuple(left[0].topics)
+    overs = {one.topics: one.over for one in pairs if one.ratios}
+    who = by_parity(topics, overs) if len(topics) > 2 else tuple(left[0].topics)
     worst = max((one for one in left if set(one.topics) & set(who)), key=lambda one: one.over)
-    by = (
-        f"by parity of {'three' if len(topics) == 3 else len(topics)} units"
-        if len(topics) > 2
-        else "in the difference of two units"
-    )
-    faults.append(_growth_fault(worst, who, by))
+    faults.append(_growth_fault(worst, who, in_words(max(len(topics), 2))))
     return faults
 
 
@@ -117,29 +111,6 @@ def _are_acquitted(pair: Judged, by_reference: Mapping[str, Judged]) -> bool:
         one is not None and one.growth is not None and one.growth.hours >= COVERS * pair.growth.hours and one.ratios
         for one in both
     )
-
-
-def _by_parity(topics: Sequence[str], pairs: Sequence[Judged]) -> tuple[str, ...]:
-    """Return the unit that three or more differ over, or those between which they do not tell.
-
-    Each pair is measured in its own limit. The unit named is in every pair beyond its limit; its nearest pair must be
-    twice as far over its limit as the farthest pair without it, so that the direction of the parity vector is clear.
-    """
-    judged = [one for one in pairs if set(one.topics) <= set(topics) and one.ratios]
-    over = [one for one in judged if one.is_beyond]
-    candidates = [topic for topic in topics if all(topic in one.topics for one in over)]
-    if len(candidates) == 1 and _is_clear(candidates[0], judged, 1.0):
-        return (candidates[0],)
-    clear = [topic for topic in topics if _is_clear(topic, judged, CLEARLY_MORE)]
-    if len(clear) == 1:
-        return (clear[0],)
-    return tuple(candidates) or tuple(topics)
-
-
-def _is_clear(topic: str, judged: Sequence[Judged], times: float) -> bool:
-    own = [one.over for one in judged if topic in one.topics]
-    others = [one.over for one in judged if topic not in one.topics]
-    return bool(own) and bool(others) and float(np.median(own)) > times * max(others)
 
 
 def _growth_fault(judged: Judged, topics: tuple[str, ...], by: str) -> InsFault:

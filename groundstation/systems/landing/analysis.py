@@ -17,7 +17,9 @@ from groundstation.results.landing_categories import ACCURACY_ONLY, axis_categor
 from groundstation.results.roles import StatesAlongTheFlight
 from groundstation.systems.analysis import Analysis, Found, RestsOn, Rules, Shortfall, main_numbers
 from groundstation.systems.known import Known
+from groundstation.systems.landing.along import along_error
 from groundstation.systems.landing.answer import (
+    AlongError,
     Approach,
     Established,
     HeightError,
@@ -29,7 +31,7 @@ from groundstation.systems.landing.answer import (
 )
 from groundstation.systems.landing.arrays import LandingPath, LandingProtection
 from groundstation.systems.landing.columns import COLUMNS
-from groundstation.systems.landing.finals import End, Final, ends_of, final_of
+from groundstation.systems.landing.finals import Final, ends_of, final_of
 from groundstation.systems.landing.findings import findings_of
 from groundstation.systems.landing.geometry import (
     ROLL_OUT_MIN_MPS,
@@ -83,7 +85,7 @@ def _run(flight: "Flight", known: Known, settings: LandingSettings) -> Found[Lan
         settings=asdict(settings),
         figures=_figures(told),
     )
-    return Found(answer, findings_of(answer))
+    return Found(answer, findings_of(answer, known.runways_problem))
 
 
 def _finals(
@@ -100,7 +102,7 @@ def _finals(
     ends = ends_of(path, known.phases, settings)
     if not ends:
         raise NotAssessableError("landing", "no landing in the log, and no guided descent followed by a climb")
-    found = [final_of(path, end, known.site, settings) for end in ends[:MOST_ANALYSED]]
+    found = [final_of(path, end, known.site, settings, known.runways) for end in ends[:MOST_ANALYSED]]
     left_out = tuple(one for one in found if isinstance(one, LeftOutApproach))
     finals = [one for one in found if isinstance(one, Final)]
     if not finals:
@@ -116,11 +118,15 @@ def _examine(flight: "Flight", known: Known, settings: LandingSettings) -> tuple
     def where(some: list[Final]) -> tuple[tuple[float, float], ...]:
         return tuple((float(path.time_s[one.first]), one.end.time_s) for one in some)
 
-    unlisted = [one for one in finals if one.runway is None]
+    unlisted = [one for one in finals if one.runway is None and (one.chosen is None or one.chosen.runway is None)]
     unguided = [one for one in finals if one.guided is None]
     found = [Shortfall(f"no straight final: {one.reason}", ((one.time_s, one.time_s),)) for one in left_out]
     if unlisted:
-        found.append(Shortfall("no runway of the site file: course and threshold from the positions", where(unlisted)))
+        found.append(
+            Shortfall(
+                "no runway of the site file or the table: course and threshold from the positions", where(unlisted)
+            )
+        )
     if unguided:
         found.append(Shortfall("no guidance followed: errors across the course are not measured", where(unguided)))
     return tuple(found)
@@ -147,7 +153,7 @@ def _approach(
     sensitivity = (
         _sensitivity(path, relative, runway, source, float(np.hypot(*step_m))) if path.guidance_topic else None
     )
-    errors = _position_errors(flight, path, final, runway, source, sensitivity, settings)
+    errors, along = _position_errors(flight, path, final, runway, relative, source, sensitivity, settings)
     protection = protection_along(flight, path.time_s[final.first], final.end.time_s, number)
     lands = final.end.outcome == "landing"
     approach = Approach(
@@ -170,6 +176,7 @@ def _approach(
         protection=None if protection is None else protection[0],
         claim=_claim(errors, runway),
         position_step_m=step_m if any(step_m) else None,
+        along_errors=along,
         height_errors=_height_errors(flight, path, runway, final.end.time_s, settings) if lands else (),
     )
     return _Told(approach, samples_of_final(number, path, relative), None if protection is None else protection[1])
@@ -245,26 +252,28 @@ def _position_errors(
     path: FlightPath,
     final: Final,
     runway: RunwayUsed,
+    relative: RelativeToRunway,
     source: str,
     sensitivity: Sensitivity | None,
     settings: LandingSettings,
-) -> tuple[PositionError, ...]:
-    """Return the error of each source of positions across the course.
+) -> tuple[tuple[PositionError, ...], tuple[AlongError, ...]]:
+    """Return the errors of each source of positions across and along the course.
 
     Nothing where no localizer was followed.
     """
     guided = final.guided
     if guided is None:
-        return ()
+        return (), ()
     if SATELLITES in source:
         reason = "guidance was by a satellite receiver, not a localizer"
-        return (PositionError(path.position_topic, "not measured", reason, 0),)
+        return (PositionError(path.position_topic, "not measured", reason, 0),), ()
     if sensitivity is not None and not fits(sensitivity):
         reason = f"positions move by {sensitivity.ratio:.2f} of what the localizer shows: no reference"
-        return (PositionError(path.position_topic, "not measured", reason, 0),)
-    return tuple(
-        _error_of(flight, topic, path, runway, guided, final.end, settings) for topic in position_topics(flight)
-    )
+        return (PositionError(path.position_topic, "not measured", reason, 0),), ()
+    both = [
+        _errors_of(flight, topic, path, runway, relative, guided, final, settings) for topic in position_topics(flight)
+    ]
+    return tuple(across for across, _along in both), tuple(along for _across, along in both)
 
 
 def _height_errors(
@@ -275,16 +284,18 @@ def _height_errors(
     return tuple(one for one in found if one is not None)
 
 
-def _error_of(
+def _errors_of(
     flight: "Flight",
     topic: str,
     path: FlightPath,
     runway: RunwayUsed,
+    relative: RelativeToRunway,
     guided: slice,
-    end: End,
+    final: Final,
     settings: LandingSettings,
-) -> PositionError:
-    """Return the error of a topic's positions on the guided part, then on the roll-out."""
+) -> tuple[PositionError, AlongError]:
+    """Return the errors of a topic's positions on the guided part, then on the roll-out."""
+    end = final.end
     table = flight[topic].unique_times()
     time_s = flight.seconds(table.time_ns)
     guided_from_s, guided_until_s = float(path.time_s[guided.start]), float(path.time_s[guided.stop - 1])
@@ -301,7 +312,7 @@ def _error_of(
     crossing_s = float(np.interp(0.0, distance_m[order], time_s[order])) if len(order) else guided_until_s
     speed = np.interp(time_s, path.time_s, path.ground_speed_mps)
     positions = Positions(topic, time_s - crossing_s, latitude, longitude, steps)
-    return position_error(
+    across = position_error(
         positions,
         np.interp(time_s, path.time_s, path.lateral_dots, left=np.nan, right=np.nan),
         time_s <= guided_until_s,
@@ -310,6 +321,7 @@ def _error_of(
         crossing_s,
         settings,
     )
+    return across, along_error(positions, crossing_s, path, final, runway, relative, settings)
 
 
 def _claim(errors: tuple[PositionError, ...], runway: RunwayUsed) -> str:

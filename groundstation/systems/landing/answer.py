@@ -6,46 +6,14 @@ from typing import ClassVar, Literal
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
+from groundstation.systems.landing.runway_answer import RunwayUsed as RunwayUsed
 
 Outcome = Literal["landing", "go-around"]
-PlacedBy = Literal["site file", "positions"]
 Measured = Literal["measured", "not measured"]
 GLIDE_SLOPE_DOT = 0.12  # a dot is so much of the glide angle (ICAO Annex 10, volume I, 3.1.5.6.2)
 SINK_S = 3.0  # before the touchdown, over which the sink rate is taken
 LAST_SINK_S = 0.5  # the same behind the flare, where the best trajectory shows it
 PEAK_S = 2.0  # about the touchdown, within which the peak load is sought
-
-
-@dataclass(frozen=True, kw_only=True)
-class RunwayUsed:
-    """The runway an approach is measured against.
-
-    Parameters
-    ----------
-    name : str
-        As in the site file; empty where none of it fits.
-    placed_by : {'site file', 'positions'}
-        Source of threshold and course. By positions: the line through the positions of the final, the threshold where
-        ``place_reason`` says.
-    true_course_deg, course_sigma_deg : float
-    localizer_width_m, localizer_distance_m : float
-        Full width of the course sector at the threshold, distance from there to the antenna.
-    """
-
-    name: str
-    placed_by: PlacedBy
-    latitude_deg: float
-    longitude_deg: float
-    true_course_deg: float
-    course_sigma_deg: float
-    elevation_m: float | None
-    glide_angle_deg: float
-    threshold_crossing_height_m: float
-    localizer_width_m: float
-    localizer_distance_m: float
-    length_m: float | None = None
-    width_m: float | None = None
-    place_reason: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,6 +166,38 @@ class PositionError:
 
 
 @dataclass(frozen=True)
+class AlongError:
+    """Error of recorded positions along the course, against the glide path.
+
+    Parameters
+    ----------
+    topic : str
+        Topic of the positions.
+    state : {'measured', 'not measured'}
+        ``reason`` says why not.
+    error_m, sigma_m : float or None
+        Position minus what height and glide path say, forward positive, as the threshold is crossed.
+    confidence95_m : (float, float) or None
+    error_from_end_m : float or None
+        The same if the threshold were not displaced: it may not have been when the log was recorded. None where the
+        runway has no displaced threshold.
+    scale : float or None
+        Distances by the glide path over those by the positions; 1 where angle and height are as taken.
+    """
+
+    topic: str
+    state: Measured
+    reason: str
+    samples: int
+    error_m: float | None = None
+    sigma_m: float | None = None
+    confidence95_m: tuple[float, float] | None = None
+    error_from_end_m: float | None = None
+    scale: float | None = None
+    parts: tuple[ErrorPart, ...] = ()
+
+
+@dataclass(frozen=True)
 class HeightError:
     """Error of a recorded altitude on the roll-out, against the elevation of the runway.
 
@@ -295,6 +295,7 @@ class Approach:
     claim: str
     position_step_m: tuple[float, float] | None = None
     height_errors: tuple[HeightError, ...] = ()
+    along_errors: tuple[AlongError, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,11 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, direction_of, wrap_180
 from groundstation.base.geodesy import METRES_PER_DEG, north_east_m
+from groundstation.base.runways.table import RunwayTable
 from groundstation.systems.known import Runway, SiteData
 from groundstation.systems.landing.answer import LeftOutApproach, Outcome
 from groundstation.systems.landing.path import FlightPath, on_guidance, step_of
+from groundstation.systems.landing.runway_choice import ChosenRunway, choose_runway, end_of_approach
 from groundstation.systems.landing.settings import LandingSettings
 
 if TYPE_CHECKING:
@@ -37,7 +39,8 @@ class End:
 class Final:
     """Samples [first, last) of a straight final.
 
-    ``guided`` are the rows of it on the guidance, ``course_deg`` is its course so far.
+    ``guided`` are the rows of it on the guidance, ``course_deg`` is its course so far. ``runway`` is that of the site
+    file, ``chosen`` what the table of runways says where the site file has none.
     """
 
     end: End
@@ -46,6 +49,7 @@ class Final:
     guided: slice | None
     course_deg: float
     runway: Runway | None
+    chosen: ChosenRunway | None = None
 
 
 def ends_of(path: FlightPath, phases: "Phases", settings: LandingSettings) -> tuple[End, ...]:
@@ -92,7 +96,9 @@ def _lowest(path: FlightPath, first: int, last: int, settings: LandingSettings) 
     return low if climbs and is_low and flies else None
 
 
-def final_of(path: FlightPath, end: End, site: SiteData, settings: LandingSettings) -> Final | LeftOutApproach:
+def final_of(
+    path: FlightPath, end: End, site: SiteData, settings: LandingSettings, table: RunwayTable | None = None
+) -> Final | LeftOutApproach:
     """The straight final that leads to an end, or why it is none."""
     last = int(np.searchsorted(path.time_s, end.time_s, side="right"))
     if last < 3 or end.time_s - path.time_s[last - 1] > AFTER_S:
@@ -107,7 +113,14 @@ def final_of(path: FlightPath, end: End, site: SiteData, settings: LandingSettin
         return LeftOutApproach(end.time_s, "no direction of flight before its end")
     rough_deg = _median_direction(track_deg[near][-max(int(near.sum() // 2), 1) :])
     runway = _runway(path, last - 1, rough_deg, site, settings)
-    course_deg = rough_deg if runway is None else runway.true_bearing_deg
+    chosen = None
+    if runway is None and table is not None:
+        is_guided = _longest_on_guidance(path, earliest, last, settings) is not None
+        lands = end.outcome == "landing"
+        ended = end_of_approach(path, last - 1, rough_deg, settings, lands=lands, is_guided=is_guided)
+        chosen = choose_runway(ended, table, settings)
+    found = None if chosen is None or chosen.runway is None else chosen.runway.true_course_deg
+    course_deg = runway.true_bearing_deg if runway is not None else rough_deg if found is None else found
     away = np.abs(wrap_180(track_deg - course_deg)) > settings.course_tolerance_deg
     turned = np.flatnonzero(away | ~np.isfinite(track_deg))
     turned = turned[from_end_m[earliest + turned] > 0.3 * settings.final_min_m]  # the last metres may turn off
@@ -116,7 +129,7 @@ def final_of(path: FlightPath, end: End, site: SiteData, settings: LandingSettin
     if reason:
         return LeftOutApproach(end.time_s, reason)
     guided = _longest_on_guidance(path, first, last, settings)
-    return Final(end, first, last, guided, course_deg, runway)
+    return Final(end, first, last, guided, course_deg, runway, chosen)
 
 
 def _track(path: FlightPath, first: int, last: int) -> FloatArray:

@@ -1,13 +1,21 @@
 """Findings about the approaches of a flight."""
 
-from groundstation.base.findings import Finding
+from collections.abc import Iterator
+
+from groundstation.base.findings import Finding, Severity
 from groundstation.systems.landing.answer import Approach, LandingResult
 from groundstation.systems.landing.reference import fits
 
 
-def findings_of(answer: LandingResult) -> tuple[Finding, ...]:
-    """Findings of all approaches, in their order."""
+def findings_of(answer: LandingResult, runways_problem: str = "") -> tuple[Finding, ...]:
+    """Findings of all approaches, in their order.
+
+    ``runways_problem``: why the user's own table of runways was not used.
+    """
     found = [finding for one in answer.approaches for finding in _of(one)]
+    if runways_problem:
+        text = f"the shipped table of runways was used: {runways_problem}"
+        found.insert(0, Finding("warn", "landing.runway_table", text))
     for left in answer.left_out[:5]:
         found.append(Finding("info", "landing.left_out", f"no approach at {left.time_s:.0f} s: {left.reason}"))
     return tuple(found)
@@ -43,7 +51,26 @@ def _of(one: Approach) -> list[Finding]:
             text = f"{name}: altitude of {height.topic} is off by {height.error_m:+.1f} m on the runway"
             text = f"{text} (sigma {height.sigma_m:.1f} m)"
             found.append(Finding("info", "landing.height_error", text, height.topic, place))
-    if one.runway.placed_by == "positions":
-        text = f"{name}: no runway of the site file: course from the positions, threshold {one.runway.place_reason}"
-        found.append(Finding("info", "landing.runway_placed", text, one.position_topic, place))
-    return found
+    return found + [
+        Finding(severity, code, f"{name}: {text}", one.position_topic, place) for severity, code, text in _runway(one)
+    ]
+
+
+def _runway(one: Approach) -> Iterator[tuple[Severity, str, str]]:
+    """Yield what is to be told of the runway."""
+    runway, choice = one.runway, one.runway.choice
+    placed = f"course from the positions, threshold {runway.place_reason}"
+    if choice is None:
+        if not runway.is_surveyed:
+            yield "info", "landing.runway_placed", f"no runway of the site file: {placed}"
+    elif choice.state == "decided":
+        sure = choice.candidates[0].probability
+        text = f"runway {runway.name} by the table of runways ({choice.table}), probability {sure:.3f}"
+        yield "info", "landing.runway_of_table", text
+        if runway.is_closed:
+            yield "warn", "landing.runway_closed", f"runway {runway.name} is closed in the table of runways"
+    elif choice.state == "not decided":
+        likely = ", ".join(f"{row.name} ({row.probability:.2f})" for row in choice.candidates)
+        yield "info", "landing.runway_not_decided", f"runway {likely}: {choice.reason}; {placed}"
+    else:
+        yield "info", "landing.runway_placed", f"no runway of the table: {choice.reason}; {placed}"

@@ -11,16 +11,20 @@ import numpy as np
 from groundstation.base.angles import FloatArray, direction_of
 from groundstation.base.geodesy import SEMI_MAJOR_M, latitude_longitude_deg, north_east_m
 from groundstation.base.records import BoolArray
+from groundstation.base.runways.table import RunwayDirection
 from groundstation.base.units import DOTS_PER_FULL_SCALE
 from groundstation.systems.landing.answer import GLIDE_SLOPE_DOT, RunwayUsed
 from groundstation.systems.landing.arrays import LandingPath
 from groundstation.systems.landing.finals import Final
 from groundstation.systems.landing.path import FlightPath
+from groundstation.systems.landing.runway_answer import RunwayChoice
+from groundstation.systems.landing.runway_choice import named
 from groundstation.systems.landing.settings import LandingSettings
 
 LINE_M = 5_000.0  # of a final without guidance, the line goes through so much of its end
 VELOCITY_ERROR_MPS = 0.5  # of positions that nothing corrects: turns the line they make
 ROLL_OUT_S, ROLL_OUT_MIN_MPS = 40.0, 12.0
+BEHIND_THE_END_M = 300.0  # the antenna of the localizer, where nothing says its place
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,11 +75,11 @@ def line_through(path: FlightPath, rows: slice, shift_m: FloatArray | None = Non
 
 
 def runway_of(path: FlightPath, final: Final, settings: LandingSettings) -> RunwayUsed:
-    """The runway of the site file, else one placed by the positions themselves."""
+    """The runway of the site file, else of the table, else one placed by the positions."""
     listed = final.runway
     width_m, distance_m = settings.localizer_width_m, settings.localizer_distance_m
     if listed is not None and listed.latitude_deg is not None and listed.longitude_deg is not None:
-        behind_m = distance_m if listed.length_m is None else max(listed.length_m + 300.0, 500.0)
+        behind_m = distance_m if listed.length_m is None else max(listed.length_m + BEHIND_THE_END_M, 500.0)
         return RunwayUsed(
             name=listed.name,
             placed_by="site file",
@@ -90,13 +94,50 @@ def runway_of(path: FlightPath, final: Final, settings: LandingSettings) -> Runw
             localizer_distance_m=_given(listed.localizer_distance_m, behind_m),
             length_m=listed.length_m,
             width_m=listed.width_m,
+            landing_length_m=listed.length_m,
         )
+    if final.chosen is not None and final.chosen.runway is not None:
+        return _of_the_table(final.chosen.runway, final.chosen.choice, settings)
     line = _course_line(path, final, settings)
     latitude, longitude, reason = _threshold(path, final, line, settings)
     speed_mps = float(np.nanmedian(path.ground_speed_mps[final.first : final.last]))
     drift_deg = 0.0 if path.position_topic.startswith("gnss") else np.rad2deg(VELOCITY_ERROR_MPS / max(speed_mps, 1.0))
     sigma_deg = float(np.hypot(np.rad2deg(np.sqrt(2.0) * line.scatter_m / max(line.length_m, 1.0)), drift_deg))
-    return replace(_placed(line, latitude, longitude, settings), course_sigma_deg=sigma_deg, place_reason=reason)
+    choice = None if final.chosen is None else final.chosen.choice
+    return replace(
+        _placed(line, latitude, longitude, settings),
+        name="" if choice is None else named(choice),
+        course_sigma_deg=sigma_deg,
+        place_reason=reason,
+        choice=choice,
+    )
+
+
+def _of_the_table(one: RunwayDirection, choice: RunwayChoice, settings: LandingSettings) -> RunwayUsed:
+    """A runway of the table, with the aids of the settings."""
+    return RunwayUsed(
+        name=one.full_name,
+        placed_by="runway table",
+        latitude_deg=one.latitude_deg,
+        longitude_deg=one.longitude_deg,
+        true_course_deg=one.true_course_deg,
+        course_sigma_deg=one.course_sigma_deg,
+        elevation_m=one.elevation_m,
+        glide_angle_deg=settings.glide_angle_deg,
+        threshold_crossing_height_m=settings.threshold_crossing_height_m,
+        localizer_width_m=settings.localizer_width_m,
+        localizer_distance_m=max(one.landing_length_m + BEHIND_THE_END_M, 500.0),
+        length_m=one.length_m,
+        width_m=one.width_m,
+        landing_length_m=one.landing_length_m,
+        displaced_m=one.displaced_m,
+        slope=one.slope,
+        surface=one.surface,
+        is_closed=one.is_closed,
+        along_sigma_m=one.along_sigma_m,
+        across_sigma_m=one.across_sigma_m,
+        choice=choice,
+    )
 
 
 def _placed(line: FittedLine, latitude_deg: float, longitude_deg: float, settings: LandingSettings) -> RunwayUsed:

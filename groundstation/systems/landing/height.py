@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from groundstation.base.runways.table import ELEVATION_SIGMA_M
 from groundstation.results.landing_categories import LINEAR_95
 from groundstation.systems.landing.answer import ErrorPart, HeightError, RunwayUsed
 from groundstation.systems.landing.geometry import ROLL_OUT_MIN_MPS, ROLL_OUT_S, along_and_across
@@ -37,8 +38,8 @@ def height_error(
     rows = table.valid(name, *POSITION) & (speed_mps >= ROLL_OUT_MIN_MPS)
     rows &= (time_s >= touchdown_s) & (time_s <= touchdown_s + ROLL_OUT_S)
     used = table.take(rows)
-    if runway.placed_by != "site file" or runway.elevation_m is None:
-        return HeightError(topic, "not measured", "no elevation of the runway in the site file", len(used))
+    if not runway.is_surveyed or runway.elevation_m is None:
+        return HeightError(topic, "not measured", "no elevation of the runway", len(used))
     if name != ALTITUDES[0]:
         reason = "altitude above the ellipsoid, where the elevation counts from mean sea level"
         return HeightError(topic, "not measured", reason, len(used))
@@ -46,11 +47,12 @@ def height_error(
         return HeightError(topic, "not measured", "too few altitudes on the roll-out", len(used))
     before_m, _ = along_and_across(used.values("latitude_deg"), used.values("longitude_deg"), runway)
     altitude_m = used.values(name)
+    elevation_sigma_m = settings.elevation_sigma_m if runway.placed_by == "site file" else ELEVATION_SIGMA_M
     error_m = float(np.mean(altitude_m)) - runway.elevation_m - settings.reference_height_m
     parts = (
         ErrorPart("slope of the runway", 0.5 * settings.runway_slope * abs(float(np.mean(before_m)))),  # 95 %
         ErrorPart("height above the wheels", settings.reference_height_sigma_m),
-        ErrorPart("elevation of the threshold", settings.elevation_sigma_m),
+        ErrorPart("elevation of the threshold", elevation_sigma_m),
         ErrorPart("scatter of the altitudes", float(np.std(altitude_m))),  # it may last as long as the roll-out
     )
     sigma_m = math.hypot(*(part.sigma_m for part in parts))

@@ -105,7 +105,7 @@ def final(results: FlightResults, of: str) -> Plot | None:
     if found is None:
         return None
     one, own = found
-    where = "threshold of the site file" if one.runway.placed_by == "site file" else one.runway.place_reason
+    where = f"that of the {one.runway.placed_by}" if one.runway.is_surveyed else one.runway.place_reason
     return Plot(
         f"landing.final.{of}",
         f"Approach {one.number}: the final",

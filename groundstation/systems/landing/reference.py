@@ -154,7 +154,7 @@ def position_error(
         change_sigma_m=change_sigma_m,
         residual_ratio=fit.residual_ratio,
     )
-    if runway.placed_by != "site file":
+    if not runway.is_surveyed:
         return told
     error_m, sigma_m, rate_sigma_mps = float(fit.state[0]), fit.sigma(AT_THRESHOLD), fit.sigma(RATE)
     half_m = LINEAR_95 * sigma_m
@@ -240,12 +240,17 @@ def _parts(
         ("bends of the course", np.outer(bend_m, bend_m) * alike),
         (WIDTH, np.outer(width, width)),
         (BEARING, np.outer(bearing, bearing)),
-        (THRESHOLD, np.full((len(used), len(used)), settings.threshold_sigma_m**2)),
+        (THRESHOLD, np.full((len(used), len(used)), _across_sigma_m(runway, settings) ** 2)),
         ("steps of the positions", _steps(positions, used, runway)),
         (ROUNDING, np.full((len(used), len(used)), _rounding_m(positions, runway, settings) ** 2)),
         (CURVATURE, np.outer(curvature, curvature)),
         ("noise of the positions", np.eye(len(used)) * settings.position_noise_m**2),
     )
+
+
+def _across_sigma_m(runway: RunwayUsed, settings: LandingSettings) -> float:
+    """Return the sigma of the threshold across the course: of the table, else of a survey."""
+    return settings.threshold_sigma_m if runway.across_sigma_m is None else runway.across_sigma_m
 
 
 def step_across_m(positions: Positions, runway: RunwayUsed) -> FloatArray:
@@ -334,7 +339,7 @@ def _roll_out(
     bearing_m = np.deg2rad(runway.course_sigma_deg) * float(np.mean(distance_m[rows]))
     own_m = math.hypot(settings.centre_line_sigma_m, settings.position_noise_m / math.sqrt(len(rows)), steps_m)
     shift_m = _rounding_m(positions, runway, settings)
-    whole_m = math.hypot(own_m, bearing_m, settings.threshold_sigma_m, shift_m)
+    whole_m = math.hypot(own_m, bearing_m, _across_sigma_m(runway, settings), shift_m)
     return _RollOut(float(np.mean(across_m[rows])), float(np.mean(positions.time_s[rows])), whole_m, own_m)
 
 

@@ -31,6 +31,9 @@ class LandingSettings:
     final_height_min_m: float = number(30.0, 1.0, 1_000.0)  # that a final descends, at least
     course_tolerance_deg: float = number(12.0, 1.0, 45.0)  # of the track to the course on a straight final
     runway_reach_m: float = number(2_000.0, 50.0, 20_000.0)  # a line that passes farther off is another runway's
+    # Scale of the errors of positions where the table of runways is asked: half of them are within 1.7 times of it.
+    gnss_position_scale_m: float = number(15.0, 0.1, 10_000.0)
+    ins_position_scale_m: float = number(300.0, 0.1, 10_000.0)
     go_around_height_max_m: float = number(1_000.0 * M_PER_FOOT, 10.0, 1_000.0)  # of its lowest point
     go_around_climb_min_m: float = number(100.0, 10.0, 1_000.0)  # from that point
 
@@ -62,6 +65,13 @@ class LandingSettings:
     positions_rounded: Rounding = (
         "unknown"  # how the recorder writes them; unknown: cut off or not, both are allowed for
     )
+
+    # The glide path as reference along the course.
+    crossing_height_sigma_m: float = number(1.5, 0.0, 20.0)  # of the path over the threshold; ICAO 3.1.5.4: 15 m + 3 m
+    height_zero_sigma_m: float = number(5.0, 0.0, 100.0)  # of a height that no roll-out ties to the runway
+    distance_scale_sigma: float = number(
+        0.05, 0.0, 0.5
+    )  # share: angle (ICAO 3.1.5.1.2: 7.5 %), air that is no standard
 
     # The runway as reference of altitudes.
     reference_height_m: float = number(3.0, 0.0, 20.0)  # of the altitude's reference above the ground, on the wheels

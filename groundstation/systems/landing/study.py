@@ -13,6 +13,7 @@ import numpy as np
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.geodesy import METRES_PER_DEG
 from groundstation.chapters.parts import Section
+from groundstation.methods.intervals import share_interval
 from groundstation.results.figures import FigureData
 from groundstation.results.landing_categories import LINEAR_95
 from groundstation.simulation.approach import (
@@ -121,7 +122,8 @@ def study_approach(
 DIGITS = {
     "measured": 0,
     "coverage": 3,
-    "coverage_sigma": 3,
+    "coverage_low": 3,
+    "coverage_high": 3,
     "rms_of_error_over_sigma": 2,
     "median_half_width_m": 1,
     "median_abs_error_m": 1,
@@ -205,11 +207,14 @@ def _judged(family: ApproachFamily, runs: int, seed: int) -> dict[str, object]:
         if found.change_m is not None and found.change_sigma_m is not None:
             changes.append(found.change_m / found.change_sigma_m)
     share = _share(scaled)
+    held = int(np.sum(np.abs(scaled) <= LINEAR_95)) if scaled else 0
+    low, high = share_interval(held, len(scaled)) if scaled else (np.nan, np.nan)
     return {
         "family": family.name,
         "measured": float(len(errors)),
         "coverage": share,
-        "coverage_sigma": float(np.sqrt(share * (1.0 - share) / max(len(errors), 1))),
+        "coverage_low": low,
+        "coverage_high": high,
         "rms_of_error_over_sigma": float(np.sqrt(np.mean(np.square(scaled)))) if scaled else np.nan,
         "median_half_width_m": float(np.median(halves)) if halves else np.nan,
         "median_abs_error_m": float(np.median(np.abs(errors))) if errors else np.nan,

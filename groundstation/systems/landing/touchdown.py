@@ -57,7 +57,7 @@ def touchdown_of(
         found_by=final.end.found_by,
         latitude_deg=latitude,
         longitude_deg=longitude,
-        past_threshold_m=-float(distance_m[0]) if runway.placed_by == "site file" else None,
+        past_threshold_m=-float(distance_m[0]) if runway.is_surveyed else None,
         ground_speed_mps=speed_mps if np.isfinite(speed_mps) else None,
         sink_rate_mps=_sink_rate(flight, path, at_s),
         peak_load_g=_peak_load(flight, at_s),
@@ -82,7 +82,7 @@ def _by_states(estimated: StatesAlongTheFlight, runway: RunwayUsed, at_s: float)
         sink_rate_mps=float(np.mean(before.velocity_down_mps)),
         sink_rate_sigma_mps=float(np.sqrt(np.mean(np.square(sigma)))),
         last_sink_rate_mps=float(np.mean(before.velocity_down_mps[before.time_s >= at_s - LAST_SINK_S])),
-        past_threshold_m=-float(distance_m[0]) if runway.placed_by == "site file" else None,
+        past_threshold_m=-float(distance_m[0]) if runway.is_surveyed else None,
         past_threshold_sigma_m=float(place_m),
     )
 

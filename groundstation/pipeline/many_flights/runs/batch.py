@@ -184,8 +184,9 @@ def run_together(
             raise
         except Exception as error:
             reason, trace = reason_of(named, error)
-            listen(Event("end", named, reason))
-            return (Outcome(named, "failed", reason, trace=trace),)
+            failed = Outcome(named, "failed", reason, trace=trace)
+            listen(Event("end", named, reason, outcomes=(failed,)))
+            return (failed,)
         job = Job(
             mcap,
             Path(out),
@@ -311,7 +312,7 @@ def _run_sessions(
             listen(Event("begin", total=len(flights) + len(found.jobs)))
             with closing(crew(enumerate(found.jobs), run_one)) as ended:
                 for number, outcome in ended:
-                    listen(Event("end", outcome.source, outcome.text))
+                    listen(Event("end", outcome.source, outcome.text, outcomes=(outcome,)))
                     outcomes[number] = outcome
             sweep_sessions([(job, outcomes[number]) for number, job in enumerate(found.jobs)])
         return (*(outcome for _, outcome in sorted(outcomes.items())), *found.told)
@@ -418,10 +419,11 @@ def _run_into(
     try:
         with closing(crew(tasks, run)) as ended:  # closed at once when something is wrong here: its processes end
             for number, outcome in ended:
-                listen(Event("end", PurePath(outcome.source).name, outcome.text))
                 destination.put(number, replace(outcome, more=()))
                 for place, other in enumerate(outcome.more, start=1):
                     destination.put(number + place * logs, other)
+                flights = destination.flights_of(number, 1 + len(outcome.more))
+                listen(Event("end", PurePath(outcome.source).name, outcome.text, outcomes=flights))
         clashing = destination.clashing()
         if clashing:
             with closing(crew(((number, suffixed(number)) for number in clashing), run)) as ended:

@@ -208,6 +208,10 @@ class Destination:
         """Outcomes of the logs put so far, by their numbers."""
         return dict(self._outcomes)
 
+    def flights_of(self, number: int, count: int) -> tuple[Outcome, ...]:
+        """Outcomes of a log with so many flights, as they stand now."""
+        return tuple(self._outcomes[number + place * len(self._names)] for place in range(count))
+
     def sweep(self, found: Scan) -> bool:
         """Remove flights of these logs that stand under another id.
 

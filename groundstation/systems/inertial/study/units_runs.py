@@ -8,6 +8,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.errors import NotAssessableError
+from groundstation.base.geodesy import displaced_deg
 from groundstation.simulation.ins_units.family import (
     BAD_INPUTS,
     BROKEN,
@@ -28,11 +29,15 @@ from groundstation.simulation.ins_units.settings import (
     UnitsSettings,
     UnitStep,
 )
+from groundstation.simulation.ins_units.unit_faults import UnitErrors
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.units import judge_units
 from groundstation.systems.inertial.units_answer import InsFault, InsUnit, Measured, UnitsResult
+from groundstation.systems.inertial.units_grid import OnGrid, apart_m
+from groundstation.systems.inertial.units_growth import growth_of
 from groundstation.systems.inertial.units_log import unit_class, unit_reference, unit_tracks
 from groundstation.systems.inertial.units_track import ReferenceTrack, UnitTrack
+from groundstation.systems.inertial.units_verdict import size_of
 from groundstation.systems.known import Known
 from groundstation.systems.study import RunStore
 from groundstation.tables.phases import Phases
@@ -45,11 +50,12 @@ FAULT_SHARE, BAD_SHARE, BROKEN_SHARE = 0.12, 0.06, 0.21  # of the healthy flight
 FEWEST = 6  # flights of a case: one of each number of units and GNSS mode
 CALLED = ("off", "one_of")
 QUANTITIES = ("rate_fit_nmiph", "velocity_rms_mps", "schuler_mps", "largest_m")
+GROWTHS = ("rate_nmiph", "velocity_mps", "schuler_mps", "largest_m")  # their names in a growth
 WITH_TRUTH = ("healthy", "broken")  # groups of which the table of units is held against the truth
 NO_PHASES = Phases((), "not asked for")  # the tracks of units do not rest on them
 # Kinds under which a fault of the family may be reported.
 EXPECTED_KIND = {
-    **{kind: kind for kind in ("drift", "tilt", "step", "stuck", "frozen")},
+    **{kind: kind for kind in ("drift", "tilt", "step", "stuck", "frozen", "heading")},
     "reset": "step",
     "swapped": "swapped_axis",
 }
@@ -248,6 +254,7 @@ def judge_flight(case: UnitsCase, run: int) -> UnitsOutcome:
         is_told=any(_is_told(one, answer) for one in settings.faults),
         cells=(
             *(_cells(flight, tracks, answer) if case.group in WITH_TRUTH else ()),
+            *(_pair_cells(flight, answer) if case.group == "healthy" else ()),
             *_lags(settings, answer),
             *_fault_cells(settings, answer),
         ),
@@ -331,6 +338,37 @@ def _cells(flight: UnitsFlight, tracks: Tracks, answer: UnitsResult) -> list[Cel
         for name in QUANTITIES:
             found += _difference(name, unit, truth)
     return found
+
+
+def _pair_cells(flight: UnitsFlight, answer: UnitsResult) -> list[CellError]:
+    """Return the errors of the table of pairs: its values less those of the simulated errors.
+
+    The healthy flights of the family begin with navigation: at the first second of the log.
+    """
+    units = {unit.topic: unit.errors for unit in flight.units}
+    found: list[CellError] = []
+    for pair in answer.pairs:
+        first, second = units[pair.first], units[pair.second]
+        apart = apart_m(_exactly(flight, second), _exactly(flight, first))
+        velocity = second.velocity_mps - first.velocity_mps
+        true = growth_of(flight.time_s, apart, velocity, from_first=not pair.is_start_known)
+        heading = float(np.median(np.rad2deg(second.azimuth_rad - first.azimuth_rad)))
+        truths = {name: size_of(true, of) for name, of in zip(QUANTITIES, GROWTHS, strict=True)}
+        truths["heading_difference_deg"] = Measured(heading, 0.0)
+        for name, truth in truths.items():
+            value = getattr(pair, name)
+            if value is not None and truth is not None:
+                found.append(CellError(f"pair {name}", value.value - truth.value, value.half95))
+    return found
+
+
+def _exactly(flight: UnitsFlight, errors: UnitErrors) -> OnGrid:
+    """Return the track of a unit without noise and rounding."""
+    motion = flight.truth.motion
+    places = motion.latitude_deg[0], flight.truth.longitude_deg
+    latitude, longitude = displaced_deg(*places, motion.altitude_m[0], errors.position_m)
+    heading = motion.heading_deg[0] + np.rad2deg(errors.azimuth_rad)
+    return OnGrid(flight.time_s, latitude, longitude, motion.altitude_m[0], errors.velocity_mps, heading)
 
 
 def _difference(name: str, unit: InsUnit, truth: InsUnit) -> list[CellError]:

@@ -1,0 +1,129 @@
+"""Lines of a run on stdout: one for each flight, as soon as it is done, the verdict first."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from groundstation.cli.text import printable, say, tell_line
+from groundstation.pipeline.one_flight.log import log_name
+from groundstation.pipeline.one_flight.outcome import Outcome, State
+from groundstation.pipeline.one_flight.progress import Event
+
+LONGEST = 160  # characters of a line behind the name of the log
+STATES: Mapping[State, str] = {"data_lost": "data lost", "limit_reached": "at the limit", "incomplete": "incomplete"}
+GRADES: Mapping[str, str] = {
+    **dict.fromkeys(("accept", "accepted", "pass", "good", "agree", "stabilised"), "green"),
+    **dict.fromkeys(("reject", "refused", "fail", "wrong", "off", "not"), "red"),
+    **dict.fromkeys(("doubtful", "undecided", "ambiguous", "warn"), "yellow"),
+}
+_BESIDE = re.compile(r" \([^()]*\)")
+
+_Key = tuple[str, int, str]
+
+
+class Lines:
+    """Lines of a run, each told once.
+
+    Parameters
+    ----------
+    longest : int, optional
+        Characters of a line behind the name of the log; left out, lines are told in full.
+    is_shown : bool
+        Whether lines are wanted, errors are told in any case.
+    everything : bool
+        Lines in full, with what each stage took and where an error came from.
+    only_news : bool
+        Without what an earlier run had finished.
+    """
+
+    def __init__(
+        self, *, longest: int | None = None, is_shown: bool = True, everything: bool = False, only_news: bool = False
+    ) -> None:
+        self._longest = None if everything else longest
+        self._is_shown, self._everything, self._only_news = is_shown, everything, only_news
+        self._told: dict[_Key, str] = {}
+        self._names: dict[str, str] = {}
+
+    def listen(self, event: Event) -> None:
+        """Tell what an event says of flights that are done."""
+        self.tell(event.outcomes)
+
+    def tell(self, outcomes: tuple[Outcome, ...]) -> None:
+        """Tell of each flight on stdout, of errors on stderr; of one told before what is new."""
+        for outcome in outcomes:
+            key = outcome.source, outcome.power_up, outcome.flight_id or outcome.text
+            if self._only_news and outcome.was_finished:
+                continue
+            before = self._told.get(key)
+            self._told[key] = outcome.text
+            if before is not None:
+                self._show(outcome, outcome.text.removeprefix(f"{before}; ") if outcome.text != before else "")
+                continue
+            if outcome.state not in ("failed", "skipped"):
+                self._show(outcome, line_of(outcome, self._longest))
+            if self._everything and outcome.times_s:
+                say("  " + ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in outcome.times_s.items()))
+            tell_errors(outcome, with_traces=self._everything)
+
+    def _show(self, outcome: Outcome, line: str) -> None:
+        if self._is_shown and line:
+            word = re.match(r"\w+", line)
+            tell_line(self._name(outcome), line, GRADES.get(word.group()) if word else None)
+
+    def _name(self, outcome: Outcome) -> str:
+        """Return the name of a log, its path where another of that name was told before."""
+        name = name_of(outcome)
+        return name if self._names.setdefault(name, outcome.source) == outcome.source else outcome.source
+
+
+def name_of(outcome: Outcome) -> str:
+    """Return the name of a log, or of the logs of a session."""
+    return outcome.source if outcome.is_session else log_name(Path(outcome.source))
+
+
+def line_of(outcome: Outcome, most: int | None = LONGEST) -> str:
+    """Return the line behind the name of a log: the verdict, its state, the flight.
+
+    Examples
+    --------
+    >>> line_of(Outcome("a.csv", "data_lost", "accept: heading error +0.9 deg", flight_id="A_1"))
+    'accept: heading error +0.9 deg  data lost  A_1'
+    >>> len(line_of(Outcome("a.csv", "done", "word, " * 99, flight_id="A_1", was_finished=True)))
+    156
+    """
+    states = (STATES.get(outcome.state, ""), "finished before" if outcome.was_finished else "")
+    behind = [part for part in (", ".join(filter(None, states)), outcome.flight_id) if part]
+    room = None if most is None else most - sum(2 + len(part) for part in behind)
+    return "  ".join(part for part in (shortened(outcome.text, room), *behind) if part)
+
+
+def shortened(text: str, most: int | None) -> str:
+    """Return text of at most so many characters: without brackets, then cut behind a clause.
+
+    Examples
+    --------
+    >>> shortened("error +0.9 deg (+0.8 with sideslip), enter -0.9 deg; 16 satellites", 40)
+    'error +0.9 deg, enter -0.9 deg ...'
+    >>> shortened("abcdefgh", 6), shortened("ab", 6)
+    ('ab ...', 'ab')
+    """
+    if most is None or len(text) <= most:
+        return text
+    text = _BESIDE.sub("", text)
+    if len(text) <= most:
+        return text
+    room = max(0, most - len(" ..."))
+    end = next((place for mark in ("; ", ", ", " ") if (place := text.rfind(mark, room // 2, room + 1)) > 0), room)
+    return f"{text[:end]} ..."
+
+
+def tell_errors(outcome: Outcome, *, with_traces: bool = False) -> None:
+    """Print on stderr why a log failed, and which parts of a flight did."""
+    traces = [outcome.trace] if outcome.state == "failed" else []
+    if outcome.state == "failed":
+        say(printable(f"error: {outcome.text}"))
+    for failure in outcome.failures:
+        say(printable(f"error: {name_of(outcome)}: {failure.text}"))
+        traces.append(failure.trace)
+    for trace in filter(None, traces if with_traces else ()):
+        say(trace.rstrip())
