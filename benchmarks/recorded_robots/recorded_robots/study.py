@@ -16,8 +16,9 @@ from groundstation.base.findings import Finding
 from groundstation.chapters.parts import Section
 from groundstation.results.figures import FigureData
 from groundstation.systems.cooperative.algorithms import run_algorithm
-from groundstation.systems.cooperative.consistency import judge
+from groundstation.systems.cooperative.consistency import judge, normalised
 from groundstation.systems.cooperative.events import prepare
+from groundstation.systems.cooperative.relative import Relative, relative_covariances
 from groundstation.systems.cooperative.settings import (
     ALGORITHMS,
     CameraBelief,
@@ -79,9 +80,17 @@ PROTOCOLS = {
 }
 COLUMNS = (
     *("set", "case", "algorithm", "rms_m", "nees", "worst_vehicle_m", "relative_m"),
-    *("diverges", "gated_share", "bytes_per_s"),
+    *("relative_nees", "diverges", "gated_share", "bytes_per_s"),
 )
-DIGITS = {"rms_m": 3, "nees": 2, "worst_vehicle_m": 3, "relative_m": 3, "gated_share": 4, "bytes_per_s": 0}
+DIGITS = {
+    "rms_m": 3,
+    "nees": 2,
+    "worst_vehicle_m": 3,
+    "relative_m": 3,
+    "relative_nees": 2,
+    "gated_share": 4,
+    "bytes_per_s": 0,
+}
 
 
 @dataclass(frozen=True)
@@ -124,34 +133,46 @@ class Score:
     """One algorithm on one case, over all draws.
 
     Horizontal RMS error of the team and of its worst vehicle, of the places of two vehicles to one another, mean NEES
-    (2 is honest), whether any run diverges, share of measurements gated, bytes that a vehicle sends in a second.
+    (2 is honest), that of the place of one vehicle to another where the algorithm claims a covariance of it, whether
+    any run diverges, share of measurements gated, bytes that a vehicle sends in a second.
     """
 
     rms_m: float
     nees: float
     worst_m: float
     relative_m: float
+    relative_nees: float
     diverges: bool
     gated: float
     bytes_per_s: float
 
 
-def score(runs: Sequence[AlgorithmRun], sessions: Sequence[Session], truth: Truth) -> Score:
-    """Judge the runs of one algorithm at every output of every vehicle with truth."""
+def score(
+    runs: Sequence[AlgorithmRun], sessions: Sequence[Session], truth: Truth, claims: Sequence[Relative] = ()
+) -> Score:
+    """Judge the runs of one algorithm at every output of every vehicle with truth.
+
+    ``claims`` of each run: covariances of the places of its vehicles to one another.
+    """
     errors: dict[str, list[FloatArray]] = {}
-    nees, relative, diverges = [], [], False
-    for run, session in zip(runs, sessions, strict=True):
-        here: dict[str, tuple[FloatArray, FloatArray]] = {}
-        for track, vehicle in zip(run.tracks, session.vehicles, strict=True):
+    nees, relative, relative_nees, diverges = [], [], [], False
+    for run, session, claim in zip(runs, sessions, claims or [{}] * len(runs), strict=True):
+        here: dict[int, tuple[FloatArray, FloatArray]] = {}
+        for number, (track, vehicle) in enumerate(zip(run.tracks, session.vehicles, strict=True)):
             if track.name in truth and len(track.time_s):
                 one = judge(track, vehicle, *truth[track.name])
-                here[track.name] = track.time_s, one.error_m
+                here[number] = track.time_s, one.error_m
                 errors.setdefault(track.name, []).append((one.error_m**2).sum(axis=1))
                 nees.append(one.nees)
                 diverges = diverges or one.diverges(track)
-        for (time_s, error), (other_s, other) in combinations(here.values(), 2):
-            _, at, to = np.intersect1d(time_s, other_s, return_indices=True)
-            relative.append(((error[at] - other[to]) ** 2).sum(axis=1))
+        for (i, (time_s, error)), (j, (other_s, other)) in combinations(here.items(), 2):
+            both_s, at, to = np.intersect1d(time_s, other_s, return_indices=True)
+            apart = error[at] - other[to]
+            relative.append((apart**2).sum(axis=1))
+            if (i, j) in claim:
+                claimed_s, covariance = claim[i, j]
+                _, at, to = np.intersect1d(both_s, claimed_s, return_indices=True)
+                relative_nees.append(normalised(apart[at], covariance[to]))
     used, gated = (sum(run.counts.get(mark, 0) for run in runs) for mark in ("used", "gated"))
     sent = sum(size for run in runs for _, size in run.messages.values())
     vehicle_s = sum(float(track.time_s[-1]) for run in runs for track in run.tracks if len(track.time_s))
@@ -161,6 +182,7 @@ def score(runs: Sequence[AlgorithmRun], sessions: Sequence[Session], truth: Trut
         _mean(nees),
         np.sqrt(max(each, default=np.nan)),
         np.sqrt(_mean(relative)),
+        _mean(relative_nees),
         diverges,
         gated / max(used + gated, 1),
         sent / max(vehicle_s, 1.0),
@@ -187,7 +209,8 @@ def study_recorded(
             remarks += [f"{one.name}, {case}: {finding.text}" for finding in prepared[0].findings]
             for name in algorithms:
                 runs = [run_algorithm(each, settings, name) for each in prepared]
-                found = score(runs, [each.session for each in prepared], one.truth)
+                claims = [relative_covariances(each, settings, run) for each, run in zip(prepared, runs, strict=True)]
+                found = score(runs, [each.session for each in prepared], one.truth, claims)
                 rows.append((one.name, case, name, *vars(found).values()))
                 if progress is not None:
                     progress(f"{one.name}, {case}, {name}: {found.rms_m:.3f} m, NEES {found.nees:.2f}")
@@ -209,7 +232,8 @@ def _page(sets: Sequence[RecordedSet], data: FigureData, remarks: Sequence[str])
         section(
             "Navigation between vehicles: recorded sets",
             "Horizontal error of all vehicles together against motion capture, at every second of the whole set; that "
-            "of their places to one another; NEES of the position (2 is honest). Nothing is calibrated with the truth: "
+            "of their places to one another; NEES of the position (2 is honest), and of the place to one another "
+            "where an algorithm keeps what two vehicles have in common. Nothing is calibrated with the truth: "
             "one group of settings for a kind of set. Bytes are those that a vehicle sends in a second.",
             *(PROTOCOLS[kind] for kind in dict.fromkeys(one.kind for one in sets)),
             table(data),

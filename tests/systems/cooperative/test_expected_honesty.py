@@ -5,11 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from groundstation.methods.intervals import nees_limits
 from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_scenario import SessionScenario, load_session
+from groundstation.systems.cooperative.algorithms import run_algorithm
+from groundstation.systems.cooperative.consistency import normalised
 from groundstation.systems.cooperative.estimate import estimate_session
 from groundstation.systems.cooperative.events import Prepared, prepare
 from groundstation.systems.cooperative.expected_honesty import expected_nees
+from groundstation.systems.cooperative.joint_covariance import joint_covariances
+from groundstation.systems.cooperative.relative import relative_covariances
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.study.cases import CASES, settings_of
 from groundstation.systems.cooperative.study.pairwise_family import Net, pairwise_table, scenario_of
@@ -70,7 +75,7 @@ def test_a_dense_session_refuses_and_a_sparse_one_runs() -> None:
         assert not unchecked.algorithms[-1].refused
         if name == "sparse":
             assert unchecked.algorithms[-1].two_sigma_r_m == rows[name].two_sigma_r_m
-    assert rows["dense"].refused.startswith("refused: NEES ") and rows["dense"].two_sigma_r_m is None
+    assert rows["dense"].refused.startswith("refused: a NEES of ") and rows["dense"].two_sigma_r_m is None
     assert "10 pairs (6 loops)" in rows["dense"].refused
     assert rows["sparse"].refused == "" and rows["sparse"].expected_nees == pytest.approx(2.0, abs=0.1)
 
@@ -80,3 +85,49 @@ def test_the_table_of_the_family_says_what_was_expected_and_what_came() -> None:
     assert data["verdict"].tolist() == ["runs", "refused"]
     assert np.isfinite(data["measured_nees"]).all()
     assert data["refused_or_consistent"].tolist()[1] == "yes"
+
+
+def test_the_joint_covariance_along_a_run_is_that_of_the_centralised_filter() -> None:
+    """Its own blocks, which the filter keeps; about the outputs instead of each estimate: some parts in a thousand."""
+    prepared, settings = _prepared(scenario_of(Net(3, 1, 20.0)))
+    run = run_algorithm(prepared, settings, "centralised")
+    times = []
+    for number, (at_s, joint) in enumerate(joint_covariances(prepared, settings, run)):
+        times.append(at_s)
+        for place, track in zip(joint.places, run.tracks, strict=True):
+            sigma = np.sqrt(np.diag(track.covariance[number]))
+            assert joint.P[place, place] / np.outer(sigma, sigma) == pytest.approx(
+                track.covariance[number] / np.outer(sigma, sigma), abs=0.02
+            )
+    assert times == run.tracks[0].time_s.tolist()
+
+
+def test_relative_places_of_two_are_claimed_alike_by_centralised_and_pairwise() -> None:
+    prepared, settings = _prepared(scenario_of(Net(2, 0, 20.0)))
+    found = {
+        name: relative_covariances(prepared, settings, run_algorithm(prepared, settings, name))
+        for name in ("dead_reckoning", "centralised", "pairwise", "ranked")
+    }
+    assert found["ranked"] == {}
+    for one, two in zip(found["centralised"][0, 1], found["pairwise"][0, 1], strict=True):
+        assert one == pytest.approx(two, rel=0.01, abs=1.0)
+    alone_m2, together_m2 = (np.linalg.eigvalsh(found[name][0, 1][1][-1]) for name in ("dead_reckoning", "centralised"))
+    assert together_m2[0] < 0.1 * alone_m2[0]  # along the range
+    assert together_m2[1] > 0.9 * alone_m2[1]  # across it nothing is measured
+
+
+def test_errors_of_relative_places_are_what_the_centralised_filter_claims() -> None:
+    scenario, nees = scenario_of(Net(3, 0, 20.0)), []
+    for run in range(12):
+        simulated = simulate_session(scenario, SEED, run)
+        settings = replace(settings_of(scenario, CASES[0]), output_step_s=100.0, map_window_s=0.0)
+        prepared = prepare(simulated.session, settings)
+        done = run_algorithm(prepared, settings, "centralised")
+        errors = [
+            track.state[:, :2] - truth.states[np.searchsorted(truth.time_s, track.time_s - 1e-6), :2]
+            for track, truth in zip(done.tracks, simulated.truth, strict=True)
+        ]
+        for (i, j), (_, covariance) in relative_covariances(prepared, settings, done).items():
+            nees.append(normalised(errors[i] - errors[j], covariance)[-1])
+    low, high = nees_limits(2, 12, 0.999)
+    assert low < float(np.mean(nees)) < high

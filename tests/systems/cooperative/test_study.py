@@ -99,3 +99,10 @@ def test_the_published_formula_claims_a_gain_that_its_errors_do_not_show() -> No
     assert sigma_m["multilevel_noise"] / sigma_m["published_formula"] > 1.5
     low, high = nees_limits(2, runs, 0.999)
     assert low < nees["considered_errors"] < high < 0.1 * nees["published_formula"]
+
+
+def test_a_verdict_is_given_on_what_was_published() -> None:
+    for case in CASES:
+        is_published = case.published not in ("not given", "none (beyond the source)")
+        assert (case.verdict == "beyond the source") != is_published, case.name
+        assert case.why or case.verdict in ("reproduced", "beyond the source"), case.name

@@ -10,6 +10,7 @@ from groundstation.systems.planning.session.study import control
 from groundstation.systems.planning.session.study.cases import CASES, SPEED, placements, scenario, with_fixed_point
 from groundstation.systems.planning.session.study.control import laws_table, page, placement_table, published_table
 from groundstation.systems.planning.session.study.flown import fly
+from groundstation.systems.planning.session.study.random_geometry import SIDES_M, random_section, random_table
 from groundstation.systems.study import StudyResult
 
 RUNS = 60
@@ -77,9 +78,20 @@ def test_the_published_distance_belongs_to_its_fixed_point_alone() -> None:
 def test_the_page_tells_every_table(published: FigureData) -> None:
     laws = laws_table(scenario(SPEED), 10, 3, lambda _text: None)
     placed = placement_table(dict(list(placements().items())[:1]), lambda _text: None)
-    text = StudyResult("control", (), page((published, laws, placed), 10, 3)).markdown
+    random = random_table(scenario(SPEED), (7.8, 7.2), 2.0, 2, 3)
+    text = StudyResult("control", (), page((published, laws, placed, random), 10, 3)).markdown
     assert (
         all(escaped(case.published) in text for case in CASES if case.plan == SPEED)
         and "NEES" in text
         and "440" in text
     )
+
+
+def test_half_of_all_random_geometries_meet_the_figures_of_speed_control_without_control() -> None:
+    found = random_table(scenario(SPEED), (7.8, 7.2), 2.0, 40, 3)
+    assert found["square_m"].tolist() == list(SIDES_M)
+    assert (found["share_low"] < found["share_within_factor_two"]).all()
+    assert found["share_within_factor_two"].mean() > 0.4
+    assert "a geometry that meets them with control proves little" in str(random_section(found).parts[0]).lower()
+    none = random_table(scenario(SPEED), (0.1, 0.1), 2.0, 5, 3)
+    assert (none["share_within_factor_two"] == 0.0).all()

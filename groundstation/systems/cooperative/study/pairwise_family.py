@@ -58,8 +58,9 @@ class Net:
 
 
 FAMILY: tuple[Net, ...] = (
-    *(Net(k, points, frame_s) for k in (3, 5, 10) for points in (0, 1, 2) for frame_s in (10.0, 60.0, 250.0)),
-    Net(3, 2, 1.0),
+    *(Net(k, points, frame_s) for k in (3, 5) for points in (0, 1, 2) for frame_s in (10.0, 60.0, 250.0)),
+    *(Net(10, points, frame_s) for points in (0, 2) for frame_s in (60.0, 250.0)),
+    *(Net(3, 2, 1.0), Net(10, 2, 10.0)),
     *(Net(k, points, frame_s, "chain") for k in (3, 5) for points in (0, 2) for frame_s in (10.0, 60.0)),
     *(Net(3, 0, 60.0, broken=broken) for broken in ("velocity", "bias", "outliers")),
 )
@@ -95,7 +96,7 @@ def _settings(scenario: SessionScenario) -> CooperativeSettings:
     return replace(settings_of(scenario, CASES[0]), map_window_s=0.0)
 
 
-def fly(net: Net, seed: int, run: int, is_repeated: bool) -> tuple[float, float, float]:
+def fly(net: Net, seed: int, run: int) -> tuple[float, float, float]:
     """Return NEES to expect, mean and worst over time, and that of one run.
 
     All are means over the aircraft. The first two are worked out for the first run alone, NaN in the others.
@@ -108,7 +109,7 @@ def fly(net: Net, seed: int, run: int, is_repeated: bool) -> tuple[float, float,
     if run == 0:
         expected = expected_nees(prepared, settings, (), GIVE_UP)
         mean, worst = float(expected.nees.mean()), expected.worst
-    done = run_algorithm(prepared, settings, "pairwise", is_repeated=is_repeated)
+    done = run_algorithm(prepared, settings, "pairwise")
     found = []
     for track, truth in zip(done.tracks, simulated.truth, strict=True):
         at = np.searchsorted(truth.time_s, track.time_s - 1e-6)
@@ -119,7 +120,7 @@ def fly(net: Net, seed: int, run: int, is_repeated: bool) -> tuple[float, float,
 def pairwise_table(nets: Sequence[Net], runs: int, seed: int, workers: int) -> FigureData:
     """Fly every net and tabulate what was to be expected beside what came."""
     runs = min(runs, MOST_RUNS)
-    jobs = [(net, seed, run, runs >= MOST_RUNS) for net in nets for run in range(runs)]
+    jobs = [(net, seed, run) for net in nets for run in range(runs)]
     if workers <= 1 or len(jobs) < 8:
         flown = [fly(*job) for job in jobs]
     else:

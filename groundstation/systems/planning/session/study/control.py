@@ -22,10 +22,12 @@ from groundstation.systems.planning.session.study.cases import (
     FIRST_SEED,
     PUBLISHED_M,
     SPEED,
+    SPEED_PUBLISHED_M,
     placements,
     scenario,
 )
 from groundstation.systems.planning.session.study.flown import fly
+from groundstation.systems.planning.session.study.random_geometry import DRAWS, random_section, random_table
 from groundstation.systems.study import StudyResult, section, table
 
 Progress = Callable[[str], object]
@@ -48,6 +50,7 @@ def study_control(runs: int = 100, seed: int = 0, progress: Progress | None = No
         published_table(tell),
         laws_table(scenario(SPEED), runs, FIRST_SEED + seed, tell),
         placement_table(placements(), tell),
+        random_table(scenario(SPEED), SPEED_PUBLISHED_M, FACTOR, DRAWS, FIRST_SEED + seed),
     )
     return StudyResult("control", tables, page(tables, runs, FIRST_SEED + seed))
 
@@ -139,7 +142,7 @@ def _is_published(before_m: float) -> bool:
 
 def page(tables: Sequence[FigureData], runs: int, seed: int) -> tuple[Section, ...]:
     """Return the study in sections."""
-    published, laws, placed = tables
+    published, laws, placed, random = tables
     return (
         section(
             "Study: control of a session, and placement of ground points",
@@ -154,6 +157,7 @@ def page(tables: Sequence[FigureData], runs: int, seed: int) -> tuple[Section, .
             "the computed 2 sigma; NEES (2 is honest) with its 95 % limits.",
             table(laws),
         ),
+        random_section(random),
         section(
             "The third point of an approach",
             "Two points stand 1000 m abeam the threshold; distances are those before the threshold. Analysis: "

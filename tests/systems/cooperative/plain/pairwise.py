@@ -8,14 +8,14 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.systems.cooperative.error_map import spectral_radius
 from groundstation.systems.cooperative.events import Prepared
-from groundstation.systems.cooperative.judging import PATIENCE
 from groundstation.systems.cooperative.loop_types import PEER, POINT
 from groundstation.systems.cooperative.messages import pairwise_bytes
-from groundstation.systems.cooperative.plain.error_map import unit_rows
-from groundstation.systems.cooperative.plain.observation import LinearisedMeasurement, rows_of
-from groundstation.systems.cooperative.plain.steps import MeasurementEvent, RunRecorder, steps
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.tracks import AlgorithmRun
+from groundstation.systems.cooperative.vehicles import PATIENCE
+from tests.systems.cooperative.plain.error_map import unit_rows
+from tests.systems.cooperative.plain.observation import LinearisedMeasurement, rows_of
+from tests.systems.cooperative.plain.steps import MeasurementEvent, RunRecorder, steps
 
 
 class _Member:
@@ -143,7 +143,7 @@ class Pairwise:
         gain = shared / total
         after = P - np.outer(shared, gain)
         for who, before, place in ((one, one.P, slice(0, n)), (other, other.P, slice(n, None))):
-            scale = after_over_before(after[place, place], before)
+            scale = _over(after[place, place], before)
             who.factors = {
                 third: factor if third in (i, j) else scale @ factor for third, factor in who.factors.items()
             }
@@ -156,7 +156,7 @@ class Pairwise:
         return True
 
 
-def after_over_before(after: FloatArray, before: FloatArray) -> FloatArray:
+def _over(after: FloatArray, before: FloatArray) -> FloatArray:
     """Return after @ inverse(before), scaled by the sigmas.
 
     States differ by eight powers of ten.
