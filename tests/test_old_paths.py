@@ -51,9 +51,9 @@ def test_a_name_that_left_a_module_that_stays_is_there() -> None:
 
 
 def test_a_folder_within_one_that_moved_is_found() -> None:
-    with pytest.warns(DeprecationWarning, match=r"now groundstation\.systems\.cooperative\.plain\.pairwise"):
+    with pytest.warns(DeprecationWarning, match=r"now groundstation\.systems\.cooperative\.filters\.pairwise"):
         old = importlib.import_module("groundstation.estimators.cooperative.plain.pairwise")
-    new = importlib.import_module("groundstation.systems.cooperative.plain.pairwise")
+    new = importlib.import_module("groundstation.systems.cooperative.filters.pairwise")
     assert vars(old).items() >= {name: value for name, value in vars(new).items() if not name.startswith("__")}.items()
 
 

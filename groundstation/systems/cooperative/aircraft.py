@@ -1,9 +1,9 @@
 """An aircraft as seen by the filters: its error states, their start and their dynamics.
 
-The dynamics are tables from which the compiled loops move the states.
+Its motion stands in aircraft_motion.py.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,8 +11,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import EARTH_RATE_RADPS, curvature_radii_m
-from groundstation.methods.link_dynamics import ROOMS
-from groundstation.systems.cooperative.judging import LEAP_M
+from groundstation.systems.cooperative.aircraft_motion import AircraftMotion, places
 from groundstation.systems.cooperative.loop_types import (
     AXES,
     EPOCH_COLUMNS,
@@ -27,12 +26,10 @@ from groundstation.systems.cooperative.loop_types import (
     RATE,
     TIME,
     VELOCITY,
-    Fleet,
     ModelNumbers,
 )
-from groundstation.systems.cooperative.motion import place, step
 from groundstation.systems.cooperative.settings import CooperativeSettings
-from groundstation.systems.cooperative.vehicles import Step, View
+from groundstation.systems.cooperative.vehicles import LEAP_M, Step, View
 from groundstation.tables.session import DeadReckoning, Frame
 
 RAD_PER_ARCSEC = float(np.deg2rad(1.0 / 3600.0))
@@ -72,7 +69,7 @@ class Aircraft:
     epochs: FloatArray
     numbers: ModelNumbers
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of states."""
         return len(self.states)
@@ -91,12 +88,12 @@ class Aircraft:
         """Index of a state, -1 without it."""
         return self.states.index(state) if state in self.states else -1
 
-    @property
+    @cached_property
     def clock(self) -> int:
         """Index of the clock offset of the link."""
         return self.at("clock_m")
 
-    @property
+    @cached_property
     def receiver_clock(self) -> int:
         """Index of the clock offset of the satellite receiver.
 
@@ -104,22 +101,27 @@ class Aircraft:
         """
         return self.at("receiver_clock_m") if "receiver_clock_m" in self.states else self.clock
 
-    @property
+    @cached_property
     def bias(self) -> int:
         """Index of the range bias."""
         return self.at("range_bias_m")
 
-    @property
+    @cached_property
     def height(self) -> int:
         """Index of the error of height."""
         return self.at("height_m")
+
+    @cached_property
+    def has_range_errors(self) -> bool:
+        """Tell whether a range has an error that is a state."""
+        return self.bias >= 0
 
     @property
     def heading(self) -> int:
         """Index of the heading: none, for it takes no bearings."""
         return -1
 
-    @property
+    @cached_property
     def doubts(self) -> Mapping[int, float]:
         """Clock states, which may leap, with the variance added when they are reopened."""
         return {self.clock: LEAP_M**2, self.receiver_clock: LEAP_M**2}
@@ -130,19 +132,17 @@ class Aircraft:
 
     def step(self, x: FloatArray, from_s: float, to_s: float) -> Step:
         """State after a step, its transition matrix and the covariance of the noise."""
-        n = self.size
-        moved, phi, noise = np.array(x, dtype=np.float64), np.empty((n, n)), np.empty((n, n))
-        step(self._alone, 0, moved, from_s, to_s, phi, noise, np.zeros((ROOMS, n, n)))
-        return moved, phi, noise
+        phi, noise = self._motion.step(from_s, to_s)
+        return phi @ x, phi, noise
 
     def place(self, x: FloatArray, at_s: float) -> tuple[FloatArray, FloatArray]:
         """Return the antenna's position and its derivative by the state, shape (3, n).
 
         The position is in the frame of the session.
         """
-        reading, derivative = np.empty(3), np.empty((3, self.size))
-        place(self._alone, 0, at_s, reading, derivative)
-        return reading + derivative @ x, derivative
+        at, derivative = places(self, np.array([at_s])), np.zeros((3, self.size))
+        derivative[:, at.states] = at.derivative[0]
+        return at.reading[0] + derivative @ x, derivative
 
     def view(self, x: FloatArray, at_s: float) -> View:
         """Return the view of the antenna; it has no heading."""
@@ -162,31 +162,8 @@ class Aircraft:
         return -float(self.place(np.zeros(self.size), at_s)[0][2])
 
     @cached_property
-    def _alone(self) -> Fleet:
-        return fleet_of((self,))
-
-
-def fleet_of(vehicles: Sequence[Aircraft]) -> Fleet:
-    """Return aircraft as the compiled loops want them; shorter states are filled up."""
-    most = max(vehicle.size for vehicle in vehicles)
-
-    def places(*names: str) -> np.ndarray:
-        return np.array([max(vehicle.at(name) for name in names) for vehicle in vehicles], dtype=np.int64)
-
-    return Fleet(
-        model=np.array([vehicle.model for vehicle in vehicles], dtype=np.int64),
-        size=np.array([vehicle.size for vehicle in vehicles], dtype=np.int64),
-        clock=places("clock_m"),
-        receiver_clock=np.array([vehicle.receiver_clock for vehicle in vehicles], dtype=np.int64),
-        bias=places("range_bias_m"),
-        height=places("height_m"),
-        lever=places("lever_forward_m"),
-        first=np.concatenate([[0], np.cumsum([len(vehicle.epochs) for vehicle in vehicles])]).astype(np.int64),
-        time_s=np.concatenate([vehicle.epochs[:, TIME] for vehicle in vehicles]),
-        epochs=np.concatenate([vehicle.epochs for vehicle in vehicles]),
-        density=np.array([np.pad(vehicle.density, (0, most - vehicle.size)) for vehicle in vehicles]),
-        numbers=np.array([vehicle.numbers for vehicle in vehicles], dtype=np.float64),
-    )
+    def _motion(self) -> AircraftMotion:
+        return AircraftMotion(self)
 
 
 def aircraft_of(track: DeadReckoning, frame: Frame, settings: CooperativeSettings) -> Aircraft:

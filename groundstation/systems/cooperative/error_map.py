@@ -12,42 +12,15 @@ from itertools import pairwise
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.systems.cooperative.loop_types import Fleet, Items
 
 
-def unit_rows(fleet: Fleet, window_s: float) -> FloatArray:
-    """Return the rows of the unit map, shape (k, n, N).
-
-    There is a block for each vehicle, filled up to the longest state; N 0: no map.
-    """
-    k, n = fleet.density.shape
+def unit_rows(sizes: Sequence[int], window_s: float) -> list[FloatArray]:
+    """Rows of the unit map, a block (m, N) for each vehicle; N is 0 where no window is judged."""
     if window_s <= 0.0:
-        return np.zeros((k, n, 0))
-    edges = np.concatenate([[0], np.cumsum(fleet.size)])
-    rows = np.zeros((k, n, int(edges[-1])))
-    for who, (one, two) in enumerate(pairwise(edges.tolist())):
-        rows[who, : two - one, one:two] = np.eye(two - one)
-    return rows
-
-
-def windows(items: Items, window_s: float) -> list[tuple[int, int]]:
-    """Split items into windows of ``window_s``: (first, behind the last) of each.
-
-    A window begins where the one before has lasted so long.
-    """
-    if window_s <= 0.0:
-        return [(0, len(items.time_s))]
-    begins, end_s = [], -np.inf
-    for at, at_s in enumerate(items.time_s.tolist()):
-        if at_s >= end_s:
-            begins.append(at)
-            end_s = at_s + window_s
-    return list(pairwise([*begins, len(items.time_s)]))
-
-
-def blocks(rows: FloatArray, fleet: Fleet) -> list[FloatArray]:
-    """Rows of every vehicle without what fills them up."""
-    return [part[:size] for part, size in zip(rows, fleet.size.tolist(), strict=True)]
+        return [np.zeros((size, 0)) for size in sizes]
+    edges = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
+    unit = np.eye(int(edges[-1]))
+    return [unit[one:two] for one, two in pairwise(edges)]
 
 
 def spectral_radius(rows: Sequence[FloatArray]) -> float:

@@ -10,14 +10,14 @@ from groundstation.base.ecef import ecef_from_n, geodetic_deg_m
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.base.records import BoolArray, Int64Array
-from groundstation.systems.cooperative.aircraft import Aircraft, aircraft_of, fleet_of
+from groundstation.systems.cooperative.aircraft import aircraft_of
+from groundstation.systems.cooperative.filters.sights import Sights
 from groundstation.systems.cooperative.loop_types import (
     HEIGHT,
     PEER,
     POINT,
     SATELLITE,
     Events,
-    Fleet,
     PointNumbers,
 )
 from groundstation.systems.cooperative.settings import CooperativeSettings
@@ -53,15 +53,10 @@ class Prepared:
     ranks: tuple[int, ...]
     findings: tuple[Finding, ...]
 
-    @property
-    def is_of_aircraft(self) -> bool:
-        """Tell whether all vehicles are aircraft, which the compiled loops know."""
-        return all(isinstance(vehicle, Aircraft) for vehicle in self.vehicles)
-
     @cached_property
-    def fleet(self) -> Fleet:
-        """The aircraft for the compiled loops."""
-        return fleet_of([vehicle for vehicle in self.vehicles if isinstance(vehicle, Aircraft)])
+    def sights(self) -> Sights:
+        """Places of antennas at the measurements, for all filters."""
+        return Sights(self.vehicles, self.events)
 
 
 def require_vehicles(prepared: "Prepared") -> None:

@@ -25,9 +25,9 @@ from groundstation.base.records import frozen
 from groundstation.systems.cooperative.answer import AlgorithmRow
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.loop_types import PEER, POINT
-from groundstation.systems.cooperative.plain.observation import LinearisedMeasurement, rows_of
-from groundstation.systems.cooperative.plain.pairwise import after_over_before
-from groundstation.systems.cooperative.plain.steps import MeasurementEvent, steps
+from groundstation.systems.cooperative.filters.observation import LinearisedMeasurement, rows_of
+from groundstation.systems.cooperative.filters.pairwise import after_over_before
+from groundstation.systems.cooperative.filters.steps import MeasurementEvent, steps
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.tracks import VehicleTrack
 

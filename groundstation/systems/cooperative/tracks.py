@@ -6,19 +6,6 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import Int64Array, frozen
-from groundstation.systems.cooperative.events import Prepared
-from groundstation.systems.cooperative.loop_types import (
-    CLOCK_LEAPS,
-    COUNTS,
-    GATED,
-    JUDGED,
-    LOST,
-    UNUSED,
-    USED,
-    Items,
-    RunRecords,
-)
-from groundstation.systems.cooperative.motion import positions
 
 
 @dataclass(frozen=True)
@@ -124,72 +111,3 @@ class AlgorithmRun:
     messages: dict[str, tuple[int, int]]
     map_time_s: FloatArray
     map_radius: FloatArray
-
-
-def log_for(prepared: Prepared, items: Items) -> RunRecords:
-    """Make an empty log for a run."""
-    k, n = prepared.fleet.density.shape
-    outputs, rows = int((items.vehicle >= 0).sum()), len(prepared.events.time_s)
-    return RunRecords(
-        np.zeros((outputs, n)),
-        np.zeros((outputs, n, n)),
-        np.zeros(rows, dtype=np.int64),
-        np.zeros(rows),
-        np.zeros(rows),
-        np.zeros(rows, dtype=np.int64),
-        np.zeros(COUNTS, dtype=np.int64),
-        np.zeros(k, dtype=np.int64),
-    )
-
-
-def finished(
-    prepared: Prepared,
-    items: Items,
-    log: RunRecords,
-    algorithm: str,
-    update: str,
-    messages: dict[str, tuple[int, int]],
-    radius: tuple[list[float], list[float]] = ([], []),
-) -> AlgorithmRun:
-    """Return everything as one frozen answer.
-
-    ``radius``: times, and spectral radii of the error map.
-    """
-    rows = int(log.counts[JUDGED])
-    mark = log.mark[:rows]
-    counts = {
-        "used": int((mark == USED).sum()),
-        "gated": int((mark == GATED).sum()),
-        "lost": int(log.counts[LOST]),
-        "unused": int(log.counts[UNUSED]),
-        "clock_leaps": int(log.counts[CLOCK_LEAPS]),
-    }
-    return AlgorithmRun(
-        algorithm,
-        update,
-        tuple(_track(prepared, items, log, who) for who in range(len(prepared.vehicles))),
-        JudgedMeasurements(log.event[:rows], log.innovation[:rows], np.sqrt(log.variance[:rows]), mark),
-        {name: count for name, count in counts.items() if count},
-        messages,
-        np.array(radius[0]),
-        np.array(radius[1]),
-    )
-
-
-def _track(prepared: Prepared, items: Items, log: RunRecords, who: int) -> VehicleTrack:
-    vehicle, n = prepared.vehicles[who], prepared.vehicles[who].size
-    mine = items.vehicle[items.vehicle >= 0] == who
-    time_s = items.time_s[items.vehicle == who]
-    state, covariance = log.x[mine][:, :n], log.P[mine][:, :n, :n]
-    position_m = np.empty((len(time_s), 3))
-    positions(prepared.fleet, who, time_s, np.ascontiguousarray(state), np.empty((3, n)), position_m)
-    return VehicleTrack(vehicle.name, time_s, position_m, state, covariance, vehicle.height)
-
-
-def counted(prepared: Prepared, sent: Int64Array, size: int) -> dict[str, tuple[int, int]]:
-    """Messages and bytes of every vehicle that sent any."""
-    return {
-        vehicle.name: (count, count * size)
-        for vehicle, count in zip(prepared.vehicles, sent.tolist(), strict=True)
-        if count
-    }

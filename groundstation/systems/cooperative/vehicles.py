@@ -11,6 +11,8 @@ from typing import Protocol
 from groundstation.base.angles import FloatArray
 
 SAME_TIME_S = 1e-9
+PATIENCE = 30  # rejections of a vehicle in a row: then its clock has leapt, or it is not where it thinks
+LEAP_M = 1e5  # sigma of a clock that has leapt
 Step = tuple[FloatArray, FloatArray, FloatArray]
 
 
@@ -66,6 +68,10 @@ class Vehicle(Protocol):
     @property
     def height(self) -> int:
         """Index of the error of height."""
+
+    @property
+    def has_range_errors(self) -> bool:
+        """Tell whether a range has an error that is a state."""
 
     @property
     def doubts(self) -> Mapping[int, float]:

@@ -35,6 +35,7 @@ class WheeledVehicle:
     receiver_clock: int = -1
     height: int = -1
     heading: int = 2
+    has_range_errors: bool = True
     doubts: Mapping[int, float] = MappingProxyType({0: LOST_M**2, 1: LOST_M**2, 2: LOST_RAD**2})
 
     def __init__(self, track: Odometry, settings: CooperativeSettings) -> None:

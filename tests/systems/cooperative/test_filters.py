@@ -1,29 +1,25 @@
 """Navigation between aircraft: models, measurements, filters."""
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
 from scipy.stats import chi2
 
-from groundstation.base.compile import Loop
 from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_scenario import SessionScenario, load_session
-from groundstation.systems.cooperative import plain
-from groundstation.systems.cooperative.aircraft import Aircraft, aircraft_of, fleet_of
+from groundstation.systems.cooperative.aircraft import Aircraft, aircraft_of
 from groundstation.systems.cooperative.algorithms import run_algorithm
-from groundstation.systems.cooperative.centralised import is_about_reckoning
 from groundstation.systems.cooperative.estimate import estimate_session
 from groundstation.systems.cooperative.events import Prepared, prepare
-from groundstation.systems.cooperative.loop_types import KINDS, PEER, Events, rows_for
+from groundstation.systems.cooperative.filters.centralised import is_about_reckoning
+from groundstation.systems.cooperative.filters.decentralised import Decentralised
+from groundstation.systems.cooperative.filters.observation import rows_of
+from groundstation.systems.cooperative.filters.sights import Sights
+from groundstation.systems.cooperative.filters.steps import MeasurementEvent
+from groundstation.systems.cooperative.loop_types import KINDS, PEER, Events
 from groundstation.systems.cooperative.messages import Broadcast, decode, pairwise_bytes, report_bytes
-from groundstation.systems.cooperative.motion import place
-from groundstation.systems.cooperative.observation import observe
-from groundstation.systems.cooperative.plain.decentralised import Decentralised
-from groundstation.systems.cooperative.plain.observation import rows_of
-from groundstation.systems.cooperative.plain.steps import MeasurementEvent
 from groundstation.systems.cooperative.settings import (
     ALGORITHMS,
     CameraBelief,
@@ -34,17 +30,18 @@ from groundstation.systems.cooperative.settings import (
 from groundstation.systems.cooperative.tracks import AlgorithmRun
 from groundstation.systems.cooperative.wheeled_vehicle import WheeledVehicle
 from groundstation.tables.session import NO_SLOT, DeadReckoning, GroundPoint, Heights, Odometry, Ranges, Session
+from tests.systems.cooperative import plain
 from tests.systems.cooperative.example import GLOBAL, LOCAL, believed, full_nees, truth_of
 
 SEEDS = range(7000, 7024)  # written down before the first run; no other is used here
 TAIL = 0.0005  # either side: seven tests of this kind fail by chance once in a hundred and fifty suites
 BRIEF = replace(LOCAL, duration_s=20.0)  # every algorithm hears every neighbour and point many times
-INTERPRETED_S = 4.0  # of a flight in loops that are not compiled
+PLAIN_S = 15.0  # of a flight that is flown in the plain filters too
 ROUNDING_M = 1e-6  # of positions of 6e6 m, through subtractions
 ROUNDING_SIGMAS = 1e-5  # rounding the measurements alone moves a plain filter that trusts its neighbours by 1.4e-6
 
 
-def test_transition_against_the_matrix_exponential(interpreted: None) -> None:
+def test_transition_against_the_matrix_exponential() -> None:
     """Local frame: x, y, vx, vy, height, clock offset, clock frequency."""
     belief = InsBelief(
         velocity_mps=10.0, velocity_s=100.0, baro_m=5.0, baro_s=50.0, clock_mps=np.sqrt(5.0), clock_s=20.0
@@ -68,14 +65,13 @@ def test_transition_against_the_matrix_exponential(interpreted: None) -> None:
     assert forth @ back == pytest.approx(np.eye(7), abs=1e-13)
 
 
-def test_global_transition_is_that_of_the_error_propagation_of_the_simulation(request: pytest.FixtureRequest) -> None:
+def test_global_transition_is_that_of_the_error_propagation_of_the_simulation() -> None:
     """Two independent writings of the same physics: the simulation's Runge-Kutta and the filter's matrices."""
     errors = replace(GLOBAL.errors, gyro_s=1e12, clock_s=1e12, baro_s=1e12)
     scenario = replace(GLOBAL, errors=errors, duration_s=240.0)
     simulated = simulate_session(scenario, 3)
     exact = simulate_session(scenario, 3, scale=0.0)  # dead reckoning without errors: the matrices along the truth
     settings = believed(scenario)
-    request.getfixturevalue("interpreted")  # from here on: the simulation's loops are compiled for other tests too
     for track, truth in list(zip(exact.session.vehicles, simulated.truth, strict=True))[:2]:
         assert isinstance(track, DeadReckoning)
         end = aircraft_of(track, "ecef", settings).step(truth.states[0], 0.0, 240.0)[0]
@@ -113,15 +109,18 @@ def lines_of(
         rows = rows_of(event, vehicle, x, source, clock)
         names = ("innovation", "receiver", "place", "clock")
         return tuple(np.array([getattr(row, name) for row in rows]) for name in names)
-    rows, reading, derivative = rows_for(vehicle.size), np.empty(3), np.empty((3, vehicle.size))
-    fleet, events = fleet_of((vehicle,)), Events(*(np.array([value]) for value in values))
-    place(fleet, 0, 2.5, reading, derivative)
-    assert observe(fleet, events, 0, x, reading, derivative, source, clock, source, False, rows) == 1
-    return rows.innovation, rows.receiver, rows.place, rows.clock
+    sight = Sights((vehicle,), Events(*(np.array([value]) for value in (*values[:3], -1, *values[4:])))).receiver(0)
+    assert sight is not None
+    event = MeasurementEvent(*values, 0)
+    rows = rows_of(event, vehicle, x, source, clock, sight=sight)
+    unseen = rows_of(event, vehicle, x, source, clock)  # asks the vehicle
+    assert rows[0].innovation == pytest.approx(unseen[0].innovation, abs=1e-9)
+    names = ("innovation", "receiver", "place", "clock")
+    return tuple(np.array([getattr(row, name) for row in rows]) for name in names)
 
 
 @pytest.mark.parametrize("kind", [*KINDS, "bearing"])
-def test_derivatives_against_central_differences(interpreted: None, kind: str) -> None:
+def test_derivatives_against_central_differences(kind: str) -> None:
     is_bearing = kind == "bearing"
     vehicle = wheeled() if is_bearing else inertial("ecef" if kind in ("satellite", "peer") else "local")
     rng = np.random.default_rng(4)
@@ -168,33 +167,16 @@ def in_plain(prepared: Prepared, settings: CooperativeSettings, algorithm: str) 
     return plain.run_decentralised(prepared, settings, algorithm)
 
 
-@pytest.fixture
-def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Loops that are to be compiled run as they are written: compiling those of the filters takes most of a minute."""
-    monkeypatch.setattr(Loop, "__call__", lambda loop, *arguments: loop.py_func(*arguments))
-
-
+@pytest.mark.parametrize("algorithm", [name for name in ALGORITHMS if name != "dead_reckoning"])
 @pytest.mark.parametrize("session", PLAIN)
-def test_the_loop_of_the_centralised_filter_is_the_plain_one(interpreted: None, session: str) -> None:
-    compiled_is_plain(session, "centralised", INTERPRETED_S)
-
-
-@pytest.mark.slow
-def test_compiled_loops_are_the_plain_filters() -> None:
-    """One test for all of them: whoever runs it compiles the loops, which takes longer than all the rest here."""
-    for session, algorithm in product(PLAIN, ALGORITHMS):
-        if algorithm != "dead_reckoning":
-            compiled_is_plain(session, algorithm)
-
-
-def compiled_is_plain(session: str, algorithm: str, longest_s: float = np.inf) -> None:
+def test_filters_are_the_plain_ones(session: str, algorithm: str) -> None:
     scenario, changes = PLAIN[session]
-    scenario = replace(scenario, duration_s=min(scenario.duration_s, longest_s))
+    scenario = replace(scenario, duration_s=min(scenario.duration_s, PLAIN_S))
     settings = believed(scenario, **changes)  # type: ignore[arg-type]
     flown = simulate_session(scenario, 5).session
     arms = 20.0 * np.random.default_rng(6).standard_normal((len(flown.ranges), 3))
     prepared = prepare(replace(flown, ranges=replace(flown.ranges, arm_m=arms)), settings)
-    run = run_algorithm(prepared, settings, algorithm, is_repeated=True)
+    run = run_algorithm(prepared, settings, algorithm)
     expected = in_plain(prepared, settings, algorithm)
     for track, other in zip(run.tracks, expected.tracks, strict=True):
         sigma = np.sqrt(np.einsum("nii->ni", other.covariance))
@@ -240,17 +222,17 @@ def test_without_errors_every_algorithm_is_right_to_rounding(algorithm: str, sce
 
 
 def test_centralised_nees() -> None:
-    """In plain numpy and fewer flights than in the slow test below."""
+    """Fewer flights than in the slow test below."""
     short = replace(LOCAL, duration_s=20.0)
-    check_nees(short, believed(short), "centralised", 7, SEEDS[:12], is_repeated=False)
+    check_nees(short, believed(short), "centralised", 7, SEEDS[:12])
 
 
 def test_dead_reckoning_nees() -> None:
-    check_nees(LOCAL, believed(LOCAL), "dead_reckoning", 7, is_repeated=False)
+    check_nees(LOCAL, believed(LOCAL), "dead_reckoning", 7)
 
 
 @pytest.mark.slow
-def test_centralised_nees_in_compiled_loops() -> None:
+def test_centralised_nees_of_more_sessions() -> None:
     check_nees(LOCAL, believed(LOCAL), "centralised", 7)
     check_nees(LOCAL, believed(LOCAL, update="simultaneous"), "centralised", 7)
     check_nees(replace(GLOBAL, duration_s=40.0), believed(GLOBAL), "centralised", 13)
@@ -266,14 +248,12 @@ def check_nees(
     algorithm: str,
     states: int,
     seeds: range = SEEDS,
-    *,
-    is_repeated: bool = True,
 ) -> None:
     """Aircraft A at the end of every run: independent draws, all states."""
     total = 0.0
     for seed in seeds:
         simulated = simulate_session(scenario, seed)
-        run = run_algorithm(prepare(simulated.session, settings), settings, algorithm, is_repeated=is_repeated)
+        run = run_algorithm(prepare(simulated.session, settings), settings, algorithm)
         total += full_nees(run.tracks[0].state, run.tracks[0].covariance, simulated.truth[0])
     low, high = chi2.ppf([TAIL, 1.0 - TAIL], states * len(seeds))
     assert low < total < high
@@ -621,7 +601,7 @@ def test_aircraft_in_line_keep_their_estimates_near_their_reckoning() -> None:
     settings = believed(scenario, gate_sigma=0.0)
     for run in (6, 7):
         simulated = simulate_session(scenario, 80_000, run)
-        found = run_algorithm(prepare(simulated.session, settings), settings, "centralised", is_repeated=True)
+        found = run_algorithm(prepare(simulated.session, settings), settings, "centralised")
         for track, truth in zip(found.tracks, simulated.truth, strict=True):
             assert np.abs(track.state[:, :2] - truth.states[:, :2]).max() < 4.5 * scenario.errors.position_m
 

@@ -8,10 +8,10 @@ import pytest
 from groundstation.systems.cooperative.algorithms import run_algorithm
 from groundstation.systems.cooperative.consistency import judge
 from groundstation.systems.cooperative.events import prepare
+from groundstation.systems.cooperative.filters.sighting import sighting_of
+from groundstation.systems.cooperative.filters.split_covariance import fuse
+from groundstation.systems.cooperative.filters.steps import MeasurementEvent
 from groundstation.systems.cooperative.loop_types import PEER
-from groundstation.systems.cooperative.plain.sighting import sighting_of
-from groundstation.systems.cooperative.plain.split_covariance import fuse
-from groundstation.systems.cooperative.plain.steps import MeasurementEvent
 from groundstation.systems.cooperative.settings import CameraBelief, CooperativeSettings, OdometryBelief
 from groundstation.systems.cooperative.tracks import VehicleTrack
 from groundstation.systems.cooperative.wheeled_vehicle import WheeledVehicle
@@ -184,7 +184,7 @@ def test_a_sighting_against_central_differences() -> None:
         assert ends[0] is not None and ends[1] is not None
         numeric = (ends[0].place_m - ends[1].place_m) / 2e-6
         assert found.derivative[:, at] == pytest.approx(numeric, abs=1e-7), observer.states[at]
-    assert sighting_of(replace(event, value_m=float("nan")), observer, x) is None
+    assert sighting_of(event._replace(value_m=float("nan")), observer, x) is None
 
 
 def test_readings_that_repeat_themselves_weigh_what_they_tell() -> None:

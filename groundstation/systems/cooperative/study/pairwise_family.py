@@ -95,7 +95,7 @@ def _settings(scenario: SessionScenario) -> CooperativeSettings:
     return replace(settings_of(scenario, CASES[0]), map_window_s=0.0)
 
 
-def fly(net: Net, seed: int, run: int, is_repeated: bool) -> tuple[float, float, float]:
+def fly(net: Net, seed: int, run: int) -> tuple[float, float, float]:
     """Return NEES to expect, mean and worst over time, and that of one run.
 
     All are means over the aircraft. The first two are worked out for the first run alone, NaN in the others.
@@ -108,7 +108,7 @@ def fly(net: Net, seed: int, run: int, is_repeated: bool) -> tuple[float, float,
     if run == 0:
         expected = expected_nees(prepared, settings, (), GIVE_UP)
         mean, worst = float(expected.nees.mean()), expected.worst
-    done = run_algorithm(prepared, settings, "pairwise", is_repeated=is_repeated)
+    done = run_algorithm(prepared, settings, "pairwise")
     found = []
     for track, truth in zip(done.tracks, simulated.truth, strict=True):
         at = np.searchsorted(truth.time_s, track.time_s - 1e-6)
@@ -119,7 +119,7 @@ def fly(net: Net, seed: int, run: int, is_repeated: bool) -> tuple[float, float,
 def pairwise_table(nets: Sequence[Net], runs: int, seed: int, workers: int) -> FigureData:
     """Fly every net and tabulate what was to be expected beside what came."""
     runs = min(runs, MOST_RUNS)
-    jobs = [(net, seed, run, runs >= MOST_RUNS) for net in nets for run in range(runs)]
+    jobs = [(net, seed, run) for net in nets for run in range(runs)]
     if workers <= 1 or len(jobs) < 8:
         flown = [fly(*job) for job in jobs]
     else:

@@ -25,7 +25,6 @@ from groundstation.systems.cooperative.tracks import AlgorithmRun
 
 Progress = Callable[[str], None]
 WORKERS = 2
-MANY_RUNS = 20  # from which on compiling the filters pays
 
 
 @dataclass(frozen=True)
@@ -74,32 +73,31 @@ def run_cases(
 
     Cases of one session see the same flights, whatever the number of workers.
     """
-    is_repeated = runs >= MANY_RUNS
     flown: dict[tuple[object, ...], tuple[CaseRun, ...]] = {}
     different = list({case.run: case for case in cases}.values())
     if workers <= 1 or len(different) * runs < 8:
         for case in different:
-            flown[case.run] = tuple(fly(case, seed, run, is_repeated) for run in range(runs))
+            flown[case.run] = tuple(fly(case, seed, run) for run in range(runs))
         return {case.name: flown[case.run] for case in cases}
     with ProcessPoolExecutor(min(workers, os.cpu_count() or 1), mp_context=get_context("spawn")) as pool:
         for case in different:
-            own = zip(*((case, seed, run, is_repeated) for run in range(runs)), strict=True)
+            own = zip(*((case, seed, run) for run in range(runs)), strict=True)
             flown[case.run] = tuple(pool.map(fly, *own, chunksize=max(1, runs // (4 * workers))))
             if progress:
                 progress(f"{case.name}: {runs} runs")
     return {case.name: flown[case.run] for case in cases}
 
 
-def fly(case: PublishedCase, seed: int, run: int, is_repeated: bool) -> CaseRun:
+def fly(case: PublishedCase, seed: int, run: int) -> CaseRun:
     """Simulate and filter one run of a case."""
     scenario = load_session(case.session)
     settings = settings_of(scenario, case)
     simulated = simulate_session(scenario, seed, run)
     prepared = prepare(simulated.session, settings)
-    done = _run(prepared, settings, case.algorithm, is_repeated)
+    done = _run(prepared, settings, case.algorithm)
     other = done
     if case.metric == "gain_over_ins":
-        other = _run(prepared, settings, case.against, is_repeated)
+        other = _run(prepared, settings, case.against)
     who = simulated.session.names.index(case.aircraft)
     errors = []
     for track, truth in zip(done.tracks, simulated.truth, strict=True):
@@ -126,10 +124,10 @@ def fly(case: PublishedCase, seed: int, run: int, is_repeated: bool) -> CaseRun:
     )
 
 
-def _run(prepared: Prepared, settings: CooperativeSettings, algorithm: str, is_repeated: bool) -> AlgorithmRun:
+def _run(prepared: Prepared, settings: CooperativeSettings, algorithm: str) -> AlgorithmRun:
     if algorithm in RULES:
         return run_rule(prepared, settings, algorithm)
-    return run_algorithm(prepared, settings, algorithm, is_repeated=is_repeated)
+    return run_algorithm(prepared, settings, algorithm)
 
 
 def _ratio(errors: list[FloatArray], tracks: Sequence[object], first: float, last: float) -> float:

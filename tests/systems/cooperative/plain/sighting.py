@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.systems.cooperative.filters.observation import NEAREST_M
 from groundstation.systems.cooperative.loop_types import PEER
-from groundstation.systems.cooperative.observation import NEAREST_M
-from groundstation.systems.cooperative.plain.observation import LinearisedMeasurement
-from groundstation.systems.cooperative.plain.steps import MeasurementEvent
 from groundstation.systems.cooperative.vehicles import Vehicle
+from tests.systems.cooperative.plain.observation import LinearisedMeasurement
+from tests.systems.cooperative.plain.steps import MeasurementEvent
 
 
 class Sighting(NamedTuple):

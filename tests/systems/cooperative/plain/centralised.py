@@ -8,15 +8,14 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.records import Int64Array
 from groundstation.methods.kalman.arrays import Pattern
 from groundstation.methods.kalman.kernels import add_noise, predict_covariance, update_covariance
-from groundstation.systems.cooperative.centralised import is_about_reckoning, reports
 from groundstation.systems.cooperative.events import Prepared
-from groundstation.systems.cooperative.joint import KNOWN_WRONG_SIGMAS
-from groundstation.systems.cooperative.judging import PATIENCE
+from groundstation.systems.cooperative.filters.centralised import KNOWN_WRONG_SIGMAS, is_about_reckoning, reports
 from groundstation.systems.cooperative.loop_types import HEIGHT, PEER, POINT
-from groundstation.systems.cooperative.plain.observation import LinearisedMeasurement, rows_of
-from groundstation.systems.cooperative.plain.steps import MeasurementEvent, RunRecorder, steps
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.tracks import AlgorithmRun
+from groundstation.systems.cooperative.vehicles import PATIENCE
+from tests.systems.cooperative.plain.observation import LinearisedMeasurement, rows_of
+from tests.systems.cooperative.plain.steps import MeasurementEvent, RunRecorder, steps
 
 
 class _Joint:

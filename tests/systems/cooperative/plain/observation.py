@@ -6,10 +6,10 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import EARTH_RATE_RADPS
+from groundstation.systems.cooperative.filters.observation import LIGHT_MPS, NEAREST_M
 from groundstation.systems.cooperative.loop_types import HEIGHT, PEER, POINT, SATELLITE
-from groundstation.systems.cooperative.observation import LIGHT_MPS, NEAREST_M
-from groundstation.systems.cooperative.plain.steps import MeasurementEvent
 from groundstation.systems.cooperative.vehicles import Vehicle, View
+from tests.systems.cooperative.plain.steps import MeasurementEvent
 
 
 @dataclass(frozen=True, slots=True)

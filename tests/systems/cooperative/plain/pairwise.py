@@ -8,14 +8,14 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.systems.cooperative.error_map import spectral_radius
 from groundstation.systems.cooperative.events import Prepared
-from groundstation.systems.cooperative.judging import PATIENCE
 from groundstation.systems.cooperative.loop_types import PEER, POINT
 from groundstation.systems.cooperative.messages import pairwise_bytes
-from groundstation.systems.cooperative.plain.error_map import unit_rows
-from groundstation.systems.cooperative.plain.observation import LinearisedMeasurement, rows_of
-from groundstation.systems.cooperative.plain.steps import MeasurementEvent, RunRecorder, steps
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.tracks import AlgorithmRun
+from groundstation.systems.cooperative.vehicles import PATIENCE
+from tests.systems.cooperative.plain.error_map import unit_rows
+from tests.systems.cooperative.plain.observation import LinearisedMeasurement, rows_of
+from tests.systems.cooperative.plain.steps import MeasurementEvent, RunRecorder, steps
 
 
 class _Member:

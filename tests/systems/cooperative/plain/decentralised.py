@@ -13,17 +13,17 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.systems.cooperative.error_map import spectral_radius
 from groundstation.systems.cooperative.events import Prepared
-from groundstation.systems.cooperative.judging import PATIENCE
 from groundstation.systems.cooperative.loop_types import HEIGHT, PEER, POINT
 from groundstation.systems.cooperative.messages import Broadcast, decode
-from groundstation.systems.cooperative.plain.error_map import Other, corrected_rows, unit_rows
-from groundstation.systems.cooperative.plain.observation import LinearisedMeasurement, rows_of
-from groundstation.systems.cooperative.plain.sighting import Sighting, sighting_of
-from groundstation.systems.cooperative.plain.split_covariance import fuse
-from groundstation.systems.cooperative.plain.steps import MeasurementEvent, RunRecorder, steps
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.tracks import AlgorithmRun
+from groundstation.systems.cooperative.vehicles import PATIENCE
 from groundstation.tables.session import NO_SLOT
+from tests.systems.cooperative.plain.error_map import Other, corrected_rows, unit_rows
+from tests.systems.cooperative.plain.observation import LinearisedMeasurement, rows_of
+from tests.systems.cooperative.plain.sighting import Sighting, sighting_of
+from tests.systems.cooperative.plain.split_covariance import fuse
+from tests.systems.cooperative.plain.steps import MeasurementEvent, RunRecorder, steps
 
 RANKED = ("ranked", "modified")
 
