@@ -112,7 +112,9 @@ def test_ranges_become_topics_of_their_peers(log: Path, tmp_path: Path) -> None:
 def test_what_is_mapped_and_what_has_no_name_is_told(log: Path, tmp_path: Path) -> None:
     (tmp_path / "radios.toml").write_text(PROFILE)
     told = [one.text for one in registry.read(log, tmp_path / "radios.toml") if isinstance(one, Remark)]
-    assert any("ranges to A1, A2, R6 = range by anchor_id and tag_id x 0.001; no name for 7, 9" in text for text in told)
+    assert any(
+        "ranges to A1, A2, R6 = range by anchor_id and tag_id x 0.001; no name for 7, 9" in text for text in told
+    )
     assert any("ranges to N11, N12 = nodes[*].dis by nodes[*].id" in text for text in told)
 
 
