@@ -1,4 +1,4 @@
-"""Verb ``export`` for the folder of a session: tracks and ranges in the formats that its systems know."""
+"""Verb ``export`` for a session: tracks and ranges in the formats of its systems."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -103,7 +103,10 @@ def links_figure(prepared: Prepared, run: AlgorithmRun) -> CooperativeLinks:
 
 
 def _ranges(prepared: Prepared, run: AlgorithmRun) -> tuple[FloatArray, FloatArray]:
-    """Return ranges less clocks and biases as estimated, and their sigmas; NaN for what is none."""
+    """Return ranges less clocks and biases as estimated, and their sigmas.
+
+    NaN for what is no range.
+    """
     event, events = run.judged.event, prepared.events
     is_first = np.ones(len(event), dtype=bool)  # the second row of an event is its bearing
     is_first[1:] = event[1:] != event[:-1]

@@ -1,4 +1,4 @@
-"""Tracks and ranges of a session as the files of robot people: TUM trajectories, and a g2o graph.
+"""Tracks and ranges of a session as files of robot people: TUM and a g2o graph.
 
 TUM (a file a vehicle): ``time x y z qx qy qz qw``, seconds UTC where the session has UTC. g2o (one file): a vertex
 ``VERTEX_SE3:QUAT`` for each vehicle and epoch, ``VERTEX_TRACKXYZ`` and ``FIX`` for ground points, ``EDGE_SE3:QUAT`` for
@@ -157,7 +157,10 @@ def _steps(graph: _Graph, name: str, first: int) -> Iterator[str]:
 
 
 def _ranges(graph: _Graph, links: CooperativeLinks, numbers: Mapping[str, int]) -> Iterator[str]:
-    """Yield ranges that were used, each brought to the nearest epochs of its ends by their tracks."""
+    """Yield the ranges that were used, each between the nearest epochs of its ends.
+
+    The tracks bring it there.
+    """
     assert links.range_m is not None and links.range_sigma_m is not None
     wanted = np.isfinite(links.range_m) & (links.mark > 0)
     for receiver in graph.tracks:

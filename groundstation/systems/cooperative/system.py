@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from groundstation.chapters.fleet.chapter import FleetChapter
     from groundstation.chapters.plots.comparison import Compared
     from groundstation.plots.plot import Describe
-    from groundstation.results.flight import FlightResults
     from groundstation.systems.study import StudyResult
 
 
@@ -60,13 +59,13 @@ def _study_cooperative() -> "Callable[..., StudyResult]":
     return study_cooperative
 
 
-def _tum() -> "Callable[[FlightResults, str], Mapping[str, str]]":
+def _tum() -> "Callable[..., Mapping[str, str]]":
     from groundstation.systems.cooperative.graph_files import tum_files
 
     return tum_files
 
 
-def _g2o() -> "Callable[[FlightResults, str], Mapping[str, str]]":
+def _g2o() -> "Callable[..., Mapping[str, str]]":
     from groundstation.systems.cooperative.graph_files import g2o_file
 
     return g2o_file
