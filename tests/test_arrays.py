@@ -38,6 +38,7 @@ OPTIONAL = {
         *("ins_error_m", "corrected_error_m"),
     },
     "forecast_growth": {"sigma_m"},
+    "cooperative_links": {"range_m", "range_sigma_m"},  # sessions of earlier versions
     "phases": {"proven"},
     "trajectory_states": {"altitude_ellipsoid_m", "altitude_msl_m"},  # one of them, by the datum of GNSS
     "trajectory_track": {"other_heading_deg"},

@@ -11,6 +11,8 @@ from groundstation.pipeline.many_flights.inputs import flight_folders, session_f
 from groundstation.pipeline.verbs.compare import compare
 from groundstation.pipeline.verbs.serve import recordings_in
 from groundstation.simulation.session_log import write_session
+from groundstation.systems.cooperative.answer import CooperativeResult
+from groundstation.systems.cooperative.arrays import CooperativeTracks
 from groundstation.systems.cooperative.comparison_plots import session_errors
 from groundstation.viewer.fleet_catalog import SESSIONS, catalog_server
 from tests.recording_contents import Contents
@@ -127,3 +129,61 @@ def test_open_takes_a_session(session: Path) -> None:
     assert opened.results.metadata["aircraft"] == "A, B, C"
     with pytest.raises(groundstation.GroundstationError, match="a session of several aircraft"):
         opened.tables["ins"]
+
+
+def test_a_session_goes_to_tum_files_that_hold_its_tracks(session: Path, tmp_path: Path) -> None:
+    assert called("export", session, "-o", tmp_path / "t.tum") == 0
+    saved = load(session)
+    tracks, answer = saved.results.rows_of(CooperativeTracks), saved.results.answer(CooperativeResult)
+    assert tracks is not None and answer is not None and saved.results.start_utc_ns is not None
+    places = {}
+    for name in answer.vehicle_names:
+        table = np.loadtxt(tmp_path / f"t_{name}.tum")  # as evo does: numbers apart from comments
+        mine = (tracks.vehicle == name) & (tracks.algorithm == answer.default_algorithm)
+        assert table[:, 0] - saved.results.start_utc_ns / 1e9 == pytest.approx(tracks.time_s[mine], abs=1e-6)
+        assert (table[:, 4:] == [0, 0, 0, 1]).all()
+        places[name] = table[:, 1:4], np.stack([tracks.x_m, tracks.y_m, tracks.z_m], axis=1)[mine]
+    (one, there), (two, here) = places["A"], places["B"]
+    assert np.linalg.norm(one - two, axis=1) == pytest.approx(np.linalg.norm(there - here, axis=1), abs=1e-3)
+
+
+def graph_of(path: Path) -> tuple[dict[int, np.ndarray], list[tuple[int, int, list[float]]], dict[str, int]]:
+    """Vertices and range edges of a g2o file, read by the grammar of its own documentation; how often each tag is."""
+    places, ranges, tags = dict[int, np.ndarray](), [], dict[str, int]()
+    length = {"VERTEX_SE3:QUAT": 8, "VERTEX_TRACKXYZ": 4, "FIX": 1, "EDGE_SE3:QUAT": 2 + 7 + 21, "EDGE_RANGE": 4}
+    for line in path.read_text().splitlines():
+        tag, _, rest = line.partition(" ")
+        if tag == "#":
+            continue
+        numbers = rest.split()
+        assert len(numbers) == length[tag]
+        tags[tag] = tags.get(tag, 0) + 1
+        if tag.startswith("VERTEX"):
+            places[int(numbers[0])] = np.array([float(one) for one in numbers[1:4]])
+        elif tag.startswith("EDGE"):
+            assert {int(one) for one in numbers[:2]} <= places.keys()
+            if tag == "EDGE_RANGE":
+                ranges.append((int(numbers[0]), int(numbers[1]), [float(one) for one in numbers[2:]]))
+    return places, ranges, tags
+
+
+def test_a_session_goes_to_a_graph_whose_ranges_fit_its_poses(session: Path, tmp_path: Path) -> None:
+    assert called("export", session, "-o", tmp_path / "g.g2o", "--track", "centralised") == 0
+    places, ranges, tags = graph_of(tmp_path / "g.g2o")
+    epochs = tags["VERTEX_SE3:QUAT"]
+    assert (tags["VERTEX_TRACKXYZ"], tags["FIX"], tags["EDGE_SE3:QUAT"]) == (2, 2, epochs - 3)
+    away = [np.linalg.norm(places[a] - places[b]) - read for a, b, (read, _) in ranges]
+    assert len(ranges) > 100 and np.std(away) < 30.0, "10 m of noise, and what the filter did not know yet"
+    assert {round(1.0 / information**0.5, 6) for _, _, (_, information) in ranges} == {10.0}
+
+
+def test_what_a_session_cannot_be_written_as_is_said(
+    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, more, text in (
+        ("t.kml", (), "expected one of .tum, .g2o"),
+        ("t.g2o", ("--track", "gnss"), "expected one of dead_reckoning, centralised"),
+    ):
+        assert called("export", session, "-o", tmp_path / name, *more) == 2
+        assert text in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

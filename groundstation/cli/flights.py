@@ -37,7 +37,7 @@ SIGNIFICANCE = {None: "", True: "beyond", False: "within"}
 @app.command(epilog=examples("clip"))
 @answers_with_exit_code
 def clip(
-    flight: Annotated[Path, typer.Argument(help="Flight folder, MCAP or log.", metavar="X", readable=False)],
+    flight: Annotated[Path, typer.Argument(help="Flight folder, session, MCAP or log.", metavar="X", readable=False)],
     output: Annotated[
         Path, typer.Option("-o", "--output", help="MCAP to write; its recording goes next to it.", metavar="FILE")
     ],
@@ -103,13 +103,14 @@ def clip(
 @app.command(epilog=examples("export"))
 @answers_with_exit_code
 def export(
-    flight: Annotated[Path, typer.Argument(help="Flight folder, MCAP or log.", metavar="X", readable=False)],
+    flight: Annotated[Path, typer.Argument(help="Flight folder, session, MCAP or log.", metavar="X", readable=False)],
     output: Annotated[
         Path,
         typer.Option(
             "-o",
             "--output",
-            help=".kml, .gpx, .csv, .parquet, .nmea or .sbet (.out); a folder for several figures.",
+            help=".kml, .gpx, .csv, .parquet, .nmea or .sbet (.out); of a session .tum or .g2o; a folder for several "
+            "figures.",
             metavar="FILE",
         ),
     ],
@@ -118,7 +119,7 @@ def export(
         typer.Option(
             "--track",
             help="Topic of the log (gnss, ins ...); of a flight folder also corrected or smoothed; may be repeated. "
-            "Default: all, or the first that the format can hold.",
+            "Default: all, or the first that the format can hold. Of a session: an algorithm.",
             metavar="NAME",
         ),
     ] = None,
@@ -141,17 +142,21 @@ def export(
 ) -> int | None:
     """Write tracks for other programs, or the data of figures as CSV.
 
-    Tracks go to Google Earth, GPX, a table, NMEA or SBET.
+    Tracks go to Google Earth, GPX, a table, NMEA or SBET; those of a session to TUM files or a g2o graph.
     """
     from groundstation.cli import printing
+    from groundstation.pipeline.many_flights.inputs import is_session
     from groundstation.pipeline.one_flight.configuration import load_configuration
     from groundstation.pipeline.verbs.export import export as written
     from groundstation.pipeline.verbs.export_figures import export_figures
+    from groundstation.pipeline.verbs.export_session import export_session
 
     if figure or figures:
         if tracks or (figure and figures):
             raise UsageError("--figure", "--track or --figures too", "--figure alone")
         outcome = export_figures(flight, output, tuple(figure or ()), force=force)
+    elif is_session(flight):
+        outcome = export_session(flight, output, names=tuple(tracks or ()), force=force)
     else:
         settings = load_configuration(config, profile=profile)
         outcome = written(flight, output, names=tuple(tracks or ()), configuration=settings, force=force)

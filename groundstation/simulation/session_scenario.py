@@ -10,7 +10,7 @@ from groundstation.base.toml_settings import check_ranges, number, required_numb
 from groundstation.simulation.satellites import orbit_of
 
 _SESSIONS = ShippedToml("groundstation.simulation", "sessions", "session")
-MOST_AIRCRAFT = 20
+MOST_AIRCRAFT = 100
 
 
 @dataclass(frozen=True)

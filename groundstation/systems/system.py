@@ -73,6 +73,22 @@ class Export(NamedTuple):
     is_page: bool = False
 
 
+class SessionExport(NamedTuple):
+    """Format in which ``export`` writes the tracks of a session.
+
+    Parameters
+    ----------
+    suffix : str
+        Of the file: ``.tum``.
+    load : callable
+        Imports what builds it and returns it: ``build(results, track)`` gives texts by what their files are named after
+        besides the target, an empty name for the target itself; ``track`` is empty for the default.
+    """
+
+    suffix: str
+    load: "Callable[[], Callable[[FlightResults, str], Mapping[str, str]]]"
+
+
 class InFleet(NamedTuple):
     """Contribution of a system to the tables of all flights and sessions.
 
@@ -137,6 +153,8 @@ class System:
         Monte Carlo behind its published figures.
     exports : tuple of Export
         Files beside the report of a flight.
+    session_exports : tuple of SessionExport
+        Formats in which ``export`` writes a session.
     chapters : callable
         Chapters of the report, in its order: what tells which answers.
     plots : callable
@@ -172,6 +190,7 @@ class System:
     plans: tuple[Plan[Any], ...] = ()
     studies: tuple[Study, ...] = ()
     exports: tuple[Export, ...] = ()
+    session_exports: tuple[SessionExport, ...] = ()
     chapters: "Callable[[], tuple[Chapter, ...]]" = _none
     plots: "Callable[[], Mapping[str, Describe]]" = _no_plots
     tabs: Callable[[], tuple[Tab, ...]] = _none

@@ -172,4 +172,5 @@ def _in_order(links: Sequence[_Link], receivers: Sequence[str], settings: Sessio
         np.concatenate([link.read_m for link in links])[order],
         np.full(len(order), settings.range_sigma_m),
         np.concatenate([link.slot for link in links])[order],
+        is_two_way=settings.two_way,
     )

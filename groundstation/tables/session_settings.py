@@ -66,6 +66,8 @@ class SessionSettings:
         A station is far when the median residual of every aircraft that hears it is larger.
     negative_limit_m : float
         Clocks can make a one-way range negative; one below this is left out.
+    two_way : bool
+        Ranges go there and back: no clock is in them.
     """
 
     range_sigma_m: float = number(10.0, 1e-3)
@@ -74,6 +76,7 @@ class SessionSettings:
     clock_limit_s: float = number(0.25, 0.001, 3600.0)
     station_limit_m: float = number(10_000.0, 1.0)
     negative_limit_m: float = number(30_000.0, 0.0)
+    two_way: bool = False
 
     def __post_init__(self) -> None:
         check_ranges(self)

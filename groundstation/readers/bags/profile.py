@@ -18,6 +18,7 @@ from groundstation.base.signals import is_canonical
 from groundstation.readers.bags.canonical import ACCEL, FIELD, POSITION, RATES, VELOCITY
 from groundstation.readers.bags.definitions import plain_name
 from groundstation.readers.bags.messages import Connection
+from groundstation.readers.bags.ranges import EACH, RangesRule
 from groundstation.readers.bags.values import Values, attitude, body, level
 from groundstation.readers.mapping import Columns
 from groundstation.readers.profile import TIME_UNITS, ColumnRule
@@ -74,6 +75,7 @@ class MessageRule:
     vectors: tuple[VectorRule, ...]
     units: Mapping[str, str]
     time: tuple[str, str] | None = None
+    ranges: RangesRule | None = None
 
     def serves(self, connection: Connection) -> bool:
         """Tell whether the rule is for a connection's messages."""
@@ -83,6 +85,7 @@ class MessageRule:
     def topics(self) -> tuple[str, ...]:
         """Canonical topics that the rule feeds."""
         fed = [*(rule.topic for rule in self.columns), *(vector.topic for vector in self.vectors)]
+        fed += self.ranges.topics if self.ranges is not None else ()
         return tuple(dict.fromkeys(fed))
 
     def feeding(self, topic: str) -> Callable[[Values], Columns]:
@@ -90,6 +93,8 @@ class MessageRule:
 
         def columns(values: Values) -> Columns:
             found: Columns = {}
+            if self.ranges is not None and topic in self.ranges.topics:
+                found |= self.ranges.columns(values, topic)
             for vector in self.vectors:
                 found |= vector.columns(values) if vector.topic == topic else {}
             for rule in self.columns:
@@ -127,6 +132,9 @@ class MessageRule:
             factor = f" x {vector.factor:g}" if vector.factor != 1.0 else ""
             parts.append(f"{vector.topic} {vector.quantity} = {self._named(vector.name)} in {vector.frame}{factor}")
             missing += [vector.name] if f"{vector.name}.x" not in present else []
+        if self.ranges is not None:
+            parts.append(self.ranges.told(present))
+            missing += self.ranges.missing(present)
         if self.time is not None:
             parts.append(f"time of validity = {self.time[0]} ({self.time[1]})")
             missing += [self.time[0]] if self.time[0] not in present else []
@@ -185,7 +193,7 @@ class _Checker(Checker):
         return MessageProfile(self.text(table["name"], "name"), found)
 
     def message(self, value: Any, key: str) -> MessageRule:
-        table = self.table(value, key, ("topic", "type", "time", "fields", "vectors"))
+        table = self.table(value, key, ("topic", "type", "time", "fields", "vectors", "ranges"))
         if "topic" not in table and "type" not in table:
             self.fail(key, "neither topic nor type", "one of them")
         columns = []
@@ -203,7 +211,31 @@ class _Checker(Checker):
             tuple(self.vector(name, entry, f"{key}.vectors.{name}") for name, entry in vectors.items()),
             {name: str(entry.get("unit", "")) for name, entry in {**fields, **vectors}.items()},
             self.time(table["time"], f"{key}.time") if "time" in table else None,
+            self.ranges(table["ranges"], f"{key}.ranges") if "ranges" in table else None,
         )
+
+    def ranges(self, value: Any, key: str) -> RangesRule:
+        table = self.table(value, key, ("value", "unit", "ends", "own", "names", "peer"), ("value",))
+        path = self.text(table["value"], f"{key}.value")
+        factor = self.unit(table.get("unit", "m"), f"{key}.unit", "m")
+        if "peer" in table:
+            if len(table.keys() & {"ends", "own", "names"}):
+                self.fail(key, "peer beside ends, own or names", "peer alone: it is the other end of every range")
+            return RangesRule(path, (), frozenset(), {}, self.text(table["peer"], f"{key}.peer"), factor)
+        self.table(table, key, (), ("ends", "names"))
+        ends = self.texts(table["ends"], f"{key}.ends")
+        if len(ends) > 2:
+            self.fail(f"{key}.ends", f"{len(ends)} paths", "one or two")
+        if EACH not in path and any(EACH in end for end in ends):
+            self.fail(f"{key}.value", repr(path), f"a path with {EACH}, as the ends have it")
+        own = frozenset(self.texts(table["own"], f"{key}.own")) if "own" in table else frozenset()
+        if len(ends) == 2 and not own:
+            self.fail(f"{key}.own", "nothing", "the ends of this log: one of two ends is its own")
+        names = self.table(table["names"], f"{key}.names", ())
+        if not names:
+            self.fail(f"{key}.names", "nothing", "a name for each other end")
+        named = {end: self.text(name, f"{key}.names.{end}") for end, name in names.items()}
+        return RangesRule(path, ends, own, named, factor=factor)
 
     def vector(self, name: str, value: Any, key: str) -> VectorRule:
         table = self.table(value, key, ("topic", "quantity", "frame", "unit"), ("topic", "quantity", "frame"))

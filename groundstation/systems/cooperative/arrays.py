@@ -45,8 +45,12 @@ class CooperativeMap(Arrays, figure="cooperative_map", digits=_TIME):
     spectral_radius: Floats
 
 
-class CooperativeLinks(Arrays, figure="cooperative_links", digits=_TIME):
-    """Innovations of every range of one algorithm; mark 1 used, -1 gated."""
+class CooperativeLinks(Arrays, figure="cooperative_links", digits={**_TIME, "*_m": 3}):
+    """Innovations of every range of one algorithm; mark 1 used, -1 gated.
+
+    ``range_m`` is the range as measured less clocks and biases as they were estimated, ``range_sigma_m`` the sigma of
+    the measurement; NaN where it is none.
+    """
 
     time_s: Floats
     receiver: Texts
@@ -54,6 +58,8 @@ class CooperativeLinks(Arrays, figure="cooperative_links", digits=_TIME):
     innovation: Floats
     sigma: Floats
     mark: Counts
+    range_m: Floats | None = None
+    range_sigma_m: Floats | None = None
 
 
 class CooperativeTraffic(Arrays, figure="cooperative_traffic"):

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from groundstation.base.angles import FloatArray
 from groundstation.results.arrays.typed import joined
 from groundstation.systems.cooperative.arrays import (
     CooperativeGeometry,
@@ -88,6 +89,7 @@ def links_figure(prepared: Prepared, run: AlgorithmRun) -> CooperativeLinks:
     judged, events = run.judged, prepared.events
     kind, source, receiver = (part[judged.event].tolist() for part in (events.kind, events.source, events.receiver))
     names = [vehicle.name for vehicle in prepared.vehicles]
+    range_m, sigma_m = _ranges(prepared, run)
     return CooperativeLinks(
         time_s=events.time_s[judged.event],
         receiver=np.array([names[one] for one in receiver], dtype=np.str_),
@@ -95,7 +97,35 @@ def links_figure(prepared: Prepared, run: AlgorithmRun) -> CooperativeLinks:
         innovation=judged.innovation,
         sigma=judged.sigma,
         mark=judged.mark,
+        range_m=range_m,
+        range_sigma_m=sigma_m,
     )
+
+
+def _ranges(prepared: Prepared, run: AlgorithmRun) -> tuple[FloatArray, FloatArray]:
+    """Return ranges less clocks and biases as estimated, and their sigmas.
+
+    NaN for what is no range.
+    """
+    event, events = run.judged.event, prepared.events
+    is_first = np.ones(len(event), dtype=bool)  # the second row of an event is its bearing
+    is_first[1:] = event[1:] != event[:-1]
+    kind, receiver, source, at_s = (
+        part[event] for part in (events.kind, events.receiver, events.source, events.time_s)
+    )
+    is_range = is_first & np.isin(kind, (PEER, POINT)) & np.isfinite(events.value_m[event])
+    range_m = np.where(is_range, events.value_m[event], np.nan)
+    for who, (vehicle, track) in enumerate(zip(prepared.vehicles, run.tracks, strict=True)):
+        if not len(track.time_s):
+            continue
+        for state, ends in (
+            (vehicle.clock, ((receiver == who, -1.0), ((kind == PEER) & (source == who), 1.0))),
+            (vehicle.bias, ((receiver == who, -1.0),)),
+        ):
+            is_free = state == vehicle.clock and prepared.session.ranges.is_two_way
+            for rows, sign in ends if state >= 0 and not is_free else ():
+                range_m[rows] += sign * np.interp(at_s[rows], track.time_s, track.state[:, state])
+    return range_m, np.where(is_range, np.sqrt(events.variance_m2[event]), np.nan)
 
 
 def traffic_figure(runs: Sequence[AlgorithmRun]) -> CooperativeTraffic:

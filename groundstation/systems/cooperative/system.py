@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 from groundstation.systems.cooperative.analysis import COOPERATIVE
-from groundstation.systems.system import InFleet, Study, System, Tab
+from groundstation.systems.system import InFleet, SessionExport, Study, System, Tab
 
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Chapter
@@ -59,6 +59,18 @@ def _study_cooperative() -> "Callable[..., StudyResult]":
     return study_cooperative
 
 
+def _tum() -> "Callable[..., Mapping[str, str]]":
+    from groundstation.systems.cooperative.graph_files import tum_files
+
+    return tum_files
+
+
+def _g2o() -> "Callable[..., Mapping[str, str]]":
+    from groundstation.systems.cooperative.graph_files import g2o_file
+
+    return g2o_file
+
+
 SYSTEM = System(
     name="cooperative",
     session_analyses=(COOPERATIVE,),
@@ -69,6 +81,7 @@ SYSTEM = System(
             _study_cooperative,
         ),
     ),
+    session_exports=(SessionExport(".tum", _tum), SessionExport(".g2o", _g2o)),
     chapters=_chapters,
     plots=_plots,
     tabs=_tabs,

@@ -7,8 +7,10 @@ import pytest
 from numpy.typing import NDArray
 
 from groundstation.base.errors import GroundstationError, SettingsError
+from groundstation.results.flight import FlightResults, Source
 from groundstation.systems.planning.session.placement import plan_placement
 from groundstation.systems.planning.session.placement_answer import GIVEN, PlacementPlan
+from groundstation.systems.planning.session.placement_plots import accuracy_map
 from groundstation.systems.planning.session.placing import PlaceLoss, Site
 from groundstation.systems.planning.session.region import Region
 from groundstation.systems.planning.session.scenario import (
@@ -135,6 +137,26 @@ def test_no_allowed_place_is_an_error_in_a_line() -> None:
 
 def test_an_optimum_beyond_the_rectangle_is_told() -> None:
     assert "placement.at_edge" in codes(approach(criterion="determinant", low_north_m=-300.0))
+
+
+@pytest.mark.parametrize("axis", ["north", "east"])
+def test_a_rectangle_without_height_or_width_is_a_line_of_places(axis: str) -> None:
+    line = {f"low_{axis}_m": -300.0, f"high_{axis}_m": -300.0}
+    answer, findings = plan_placement(approach(criterion="determinant", **line))
+    (mapped,) = (figure for figure in answer.figures if figure.name == "placement_map")
+    assert len(mapped) == 5 and (mapped[f"{axis}_m"] == -300.0).all() and np.isfinite(mapped["sigma_m"]).all()
+    placed = next(one for one in answer.places_of(answer.recommended) if one.point == "third")
+    assert (placed.north_m if axis == "north" else placed.east_m) == -300.0
+    assert "placement.at_edge" not in {finding.code for finding in findings}
+    results = FlightResults("x", Source("a", "00" * 32, 0, ""), {}, None, 0.0, "ok")
+    drawn = accuracy_map(replace(results, answers={answer.analysis: answer}, figures=answer.figures))
+    assert drawn is not None and drawn.rows[0].panels[0].x.title == ("east, km" if axis == "north" else "north, km")
+
+
+def test_a_point_where_an_aircraft_starts_is_told() -> None:
+    home = PlannedPoint("home", -BEGIN_M, 0.0, CROSSING_M + BEGIN_M * SLOPE)
+    assert "plan.at_start" in codes(approach((LEFT, RIGHT, THIRD, home)))
+    assert "plan.at_start" not in codes(approach((LEFT, RIGHT, THIRD, replace(home, height_m=0.0))))
 
 
 def test_points_on_one_line_are_told() -> None:

@@ -11,8 +11,9 @@ from functools import cached_property
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.findings import Finding
 from groundstation.base.records import frozen
-from groundstation.systems.planning.session.scenario import Controlled, SessionPlan
+from groundstation.systems.planning.session.scenario import NEAREST_M, Controlled, SessionPlan
 
 
 @dataclass(frozen=True)
@@ -125,3 +126,24 @@ class SessionMotion:
             found[row] = 0.5 * by_mean / bound.scale
             found[row, :-1] += 0.5 * by_mean[1:] / bound.scale
         return found
+
+
+def points_at_starts(plan: SessionPlan, position_m: FloatArray) -> list[Finding]:
+    """Tell which points stand where an aircraft starts.
+
+    Ranges count from the end of the first step on: a start on top of a point is no error, and hardly meant.
+
+    Parameters
+    ----------
+    plan : SessionPlan
+    position_m : ndarray, shape (sources, 3)
+        At the start: aircraft, then points.
+    """
+    count, found = len(plan.aircraft), []
+    for number, aircraft in enumerate(plan.aircraft):
+        away_m = np.linalg.norm(position_m[count:] - position_m[number], axis=1)
+        for point, distance in zip(plan.points, away_m.tolist(), strict=True):
+            if distance < NEAREST_M:
+                text = f"{point.name} stands where {aircraft.name} starts: their ranges count from {plan.step_s:g} s on"
+                found.append(Finding("warn", "plan.at_start", text))
+    return found

@@ -9,6 +9,7 @@ from groundstation.base.findings import Finding
 from groundstation.results.figures import FigureData
 from groundstation.systems.planning.session.accuracy import PLACE, AccuracyModel
 from groundstation.systems.planning.session.measures import InformationModes, geometry_of
+from groundstation.systems.planning.session.motion import points_at_starts
 from groundstation.systems.planning.session.placement_answer import GIVEN, DesignRow, PlacementPlan, PlaceRow
 from groundstation.systems.planning.session.placement_arrays import (
     PlacementAccuracy,
@@ -239,10 +240,11 @@ def _figures(site: Site, model: AccuracyModel, designs: list[Design], best: Desi
 def _map(site: Site, model: AccuracyModel, best: Design) -> PlacementMap:
     """Map weighted sigma and determinant at the fixed point over places of the last point.
 
-    The other points stay where they are.
+    The other points stay where they are. A rectangle without height or width has one row or column of places.
     """
     region, side = site.regions[-1], site.plan.placement.map_side
-    north, east = (np.linspace(low, high, side) for low, high in zip(region.low_m, region.high_m, strict=True))
+    ends = zip(region.low_m.tolist(), region.high_m.tolist(), strict=True)
+    north, east = (np.linspace(low, high, side if high > low else 1) for low, high in ends)
     grid = np.array([(one, other) for one in north for other in east])
     allowed = region.allows(grid)
     sigma, determinant = np.full(len(grid), np.nan), np.full(len(grid), np.nan)
@@ -259,7 +261,8 @@ def _map(site: Site, model: AccuracyModel, best: Design) -> PlacementMap:
 
 def _findings(site: Site, designs: list[Design], answer: PlacementPlan) -> tuple[Finding, ...]:
     row, asked = answer.design(answer.recommended), site.plan.placement
-    found: list[Finding] = []
+    best = next(one for one in designs if one.name == answer.recommended)
+    found = points_at_starts(site.plan, site.positions(best.places)[0])
     given = np.array([[site.plan.points[one].north_m, site.plan.points[one].east_m] for one in site.placed])
     for number, moved in zip(site.placed, np.linalg.norm(site.given - given, axis=1).tolist(), strict=True):
         if moved > ON_EDGE_M:
@@ -271,7 +274,7 @@ def _findings(site: Site, designs: list[Design], answer: PlacementPlan) -> tuple
     elif row.start_spread > SPREAD:
         text = f"starts end in different places: the best of {row.starts} is taken"
         found.append(Finding("info", "placement.several_minima", text))
-    found += _on_places(site, next(one for one in designs if one.name == answer.recommended), answer)
+    found += _on_places(site, best, answer)
     if not np.isfinite(row.dop):
         text = f"the points do not separate {' and '.join(asked.axes)} at the fixed point"
         found.append(Finding("warn", "placement.singular", text))
@@ -285,8 +288,9 @@ def _on_places(site: Site, best: Design, answer: PlacementPlan) -> list[Finding]
     """Points at the edge of the rectangle, and points under the way."""
     found = []
     for number, region, where in zip(site.placed, site.regions, best.places, strict=True):
-        at_edge = np.minimum(where - region.low_m, region.high_m - where).min() <= ON_EDGE_M
-        if at_edge:
+        is_wide = region.high_m - region.low_m > 2.0 * ON_EDGE_M  # a side without length has no inside
+        at_edge = np.minimum(where - region.low_m, region.high_m - where) <= ON_EDGE_M
+        if (at_edge & is_wide).any():
             text = f"{site.plan.points[number].name} is at the edge of the rectangle: the best place may lie outside"
             found.append(Finding("warn", "placement.at_edge", text))
     for row in answer.places_of(answer.recommended):

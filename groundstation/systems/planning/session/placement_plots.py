@@ -9,6 +9,7 @@ from groundstation.plots.axes import time_axis
 from groundstation.plots.marks import AnyMark, Cells, Curve, Emphasis, Limit, Outlines, Points, Role, Symbol, series
 from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import finite, padded
+from groundstation.results.arrays.typed import Floats
 from groundstation.results.flight import FlightResults
 from groundstation.systems.planning.session.placement_answer import GIVEN, PlacementPlan
 from groundstation.systems.planning.session.placement_arrays import (
@@ -36,6 +37,8 @@ def accuracy_map(results: FlightResults) -> Plot | None:
     known = finite(sigma)
     if not known.size:
         return None
+    if 1 in sigma.shape:
+        return _accuracy_on_a_line(answer, north, east, sigma.ravel())
     low, high = float(known.min()), float(np.percentile(known, TOP_SHARE))
     high = max(high, 1.05 * low)
     marks: list[AnyMark] = [
@@ -64,6 +67,32 @@ def accuracy_map(results: FlightResults) -> Plot | None:
         "Map of accuracy.",
         one_panel(panel, 100.0),
         tuple(one.name for one in (data, points, rings) if one is not None),
+    )
+
+
+def _accuracy_on_a_line(answer: PlacementPlan, north: Floats, east: Floats, sigma: Floats) -> Plot | None:
+    """Return accuracy at the fixed point over places of a rectangle that is a line.
+
+    None for a single place.
+    """
+    name, along = ("east", east) if len(east) > 1 else ("north", north)
+    if len(along) < 2:
+        return None
+    moved = next(one for one in answer.places_of(answer.recommended) if one.point == answer.moved)
+    placed = (moved.east_m if name == "east" else moved.north_m) / M_PER_KM
+    marks: list[AnyMark] = [
+        Curve(x=along, y=sigma, role="ink", name="weighted sigma"),
+        Limit(value=placed, is_upright=True, name="placed"),
+    ]
+    x_axis = Axis(f"{name}, km", low=float(along[0]), high=float(along[-1]))
+    return Plot(
+        "placement.map",
+        "Accuracy over places",
+        f"Root of the weighted variance at the fixed point if {answer.moved} stood elsewhere, the other points as "
+        f"recommended ({design_title(answer.recommended)}). The rectangle is a line.",
+        "Accuracy over places.",
+        one_panel(Panel(marks, x_axis, Axis("weighted sigma, m"), legend="above"), 60.0),
+        ("placement_map",),
     )
 
 

@@ -89,7 +89,7 @@ def _keep_out(recorder: Recorder, results: FlightResults) -> None:
 def _ground(recorder: Recorder, results: FlightResults) -> None:
     """Log the map as a mesh on the ground, a colour for each place.
 
-    No mesh where no point is allowed.
+    No mesh where no point is allowed, or the rectangle is a line.
     """
     data = results.rows_of(PlacementMap)
     if data is None:
@@ -97,7 +97,7 @@ def _ground(recorder: Recorder, results: FlightResults) -> None:
     sigma = data.sigma_m
     side = len(np.unique(data.east_m))
     known = np.isfinite(sigma)
-    if not known.any():
+    if not known.any() or side in (1, len(sigma)):
         return
     low, high = float(np.nanmin(sigma)), float(np.nanpercentile(sigma, WORST_SHARE))
     share = np.clip(np.nan_to_num(np.log(sigma / low) / max(np.log(high / low), 1e-9), nan=1.0), 0.0, 1.0)[:, None]

@@ -15,7 +15,7 @@ from groundstation.systems.planning.session.answer import UNCONTROLLED, ControlP
 from groundstation.systems.planning.session.arrays import ControlMeasures, ControlPaths, ControlPoints
 from groundstation.systems.planning.session.laws import Law, PlannedSession, integral_law, local_law, random_starts
 from groundstation.systems.planning.session.measures import InformationModes
-from groundstation.systems.planning.session.motion import Paths
+from groundstation.systems.planning.session.motion import Paths, points_at_starts
 from groundstation.systems.planning.session.placement import plan_placement
 from groundstation.systems.planning.session.scenario import LOCAL_CRITERIA, NEAREST_M, SessionPlan
 
@@ -243,7 +243,7 @@ def _figures(session: PlannedSession, flown: dict[str, LawResult]) -> tuple[Figu
 
 def _findings(session: PlannedSession, flown: dict[str, LawResult], answer: ControlPlan) -> tuple[Finding, ...]:
     best, row = flown[answer.recommended], answer.law(answer.recommended)
-    found: list[Finding] = []
+    found = points_at_starts(session.plan, best.paths.position_m[0])
     if not session.motion.bounds:
         found.append(
             Finding("info", "control.nothing_controlled", "no aircraft may be controlled: accuracy without control")
