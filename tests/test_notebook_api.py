@@ -43,7 +43,7 @@ NAMES = (
     "inertial-own-innovations landing-beacons landing-space landing-accuracy landing-trials latency-search together "
     "magnetic-deviation magnetic-held-out magnetic-track magnetic-branches magnetic-modulus magnetic-ground "
     "magnetic-flux-legs magnetic-flux-turns "
-    "landing-deviations landing-final landing-motion landing-protection map profile attitude states gaps reference "
+    "landing-deviations landing-final landing-motion landing-protection landing-runway map profile attitude states gaps reference "
     "reference-track reference-claims cooperative-map cooperative-errors cooperative-geometry cooperative-links "
     "control-paths control-measures control-law placement-map placement-accuracy "
     "units-errors units-pairs units-radial causes-along causes-velocity "

@@ -55,7 +55,10 @@ def show(
     verbose: Verbose = False,
     json: Json = False,
 ) -> int | None:
-    """Show the runways of an airport; without a name version and licence of the table."""
+    """Show the runways of an airport; without a name, the table itself.
+
+    Of the table: version, licence, rows that are left out.
+    """
     from groundstation.base.serial import to_json
     from groundstation.cli.text import as_json
     from groundstation.pipeline.verbs.runways import runways_of, table_in_use
@@ -125,7 +128,7 @@ def table_text(table: "TableInUse") -> str:
 
 
 def runways_text(found: "FoundRunways", *, everything: bool = False) -> str:
-    """Return the table of runways found, with ``everything`` the ends too."""
+    """Return the runways found as a table; with ``everything`` the sigmas too."""
     from groundstation.base.text_columns import columns
 
     if not found.found:

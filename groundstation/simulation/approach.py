@@ -88,6 +88,9 @@ class Recorded:
     is_reversed: bool = False
     dot_step: float = number(0.0101, 1e-6, 1.0)
     has_weight_on_wheels: bool = True
+    antenna_m: float = number(0.0, -20.0, 20.0)  # of the glide slope's antenna above the point whose height is logged
+    height_scale: float = number(1.0, 0.5, 2.0)  # of the logged height above the airfield: air that is no standard
+    runway_rise: float = number(0.0, -0.05, 0.05)  # per metre along the landing, of the ground that is rolled out on
 
 
 @dataclass(frozen=True)
@@ -150,8 +153,8 @@ def simulate_approach(scenario: ApproachScenario, seed: int | None = None) -> Si
     on_ground = height_m <= 0.0
     tables = {
         "ins": _ins(scenario, time_s, distance_m, across_m, speed_mps, crossing_s),
-        "guidance": _guidance(scenario, distance_m, across_m - line_m, height_m, rng),
-        "baro": {"height_above_airfield_m": np.round(height_m / 0.3048) * 0.3048},
+        "guidance": _guidance(scenario, distance_m, across_m - line_m, height_m + scenario.recorded.antenna_m, rng),
+        "baro": {"height_above_airfield_m": _logged_height(scenario.recorded, distance_m, height_m)},
         "radio_altimeter": {"height_m": np.where(height_m < 750.0, np.round(height_m, 1), np.nan)},
     }
     if scenario.recorded.has_weight_on_wheels:
@@ -276,6 +279,12 @@ def _guidance(
         "vertical_deviation_dots": _needle(vertical, 0.018),
         "frequency_mhz": np.full(len(distance_m), 110.3),
     }
+
+
+def _logged_height(recorded: Recorded, distance_m: FloatArray, height_m: FloatArray) -> FloatArray:
+    """Return the barometric height above the threshold, in whole feet; the roll-out follows the runway."""
+    rise_m = np.where(height_m <= 0.0, -recorded.runway_rise * distance_m, 0.0)
+    return np.asarray(np.round((height_m * recorded.height_scale + rise_m) / 0.3048) * 0.3048)
 
 
 def _needle(dots: FloatArray, step: float) -> FloatArray:

@@ -6,7 +6,7 @@ of that row. Some rows give the displaced threshold in place of the end; the sam
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Literal
 
@@ -188,6 +188,13 @@ class RunwayTable:
         rows = np.flatnonzero(np.char.upper(self.airport) == airport.upper())
         found = [one for row in rows for one in self.directions(int(row))]
         return tuple(sorted(found, key=lambda one: one.name))
+
+    def without(self, row: int) -> "RunwayTable":
+        """Return the table without a row."""
+        names = ("airport", "surface", "name", "latitude_deg", "longitude_deg", "elevation_m", "displaced_m")
+        arrays = {name: np.delete(getattr(self, name), row, axis=-1) for name in names}
+        arrays |= {name: np.delete(getattr(self, name), row) for name in ("length_m", "width_m", "is_closed")}
+        return replace(self, **arrays)
 
     def directions(self, row: int) -> Iterator[RunwayDirection]:
         """Yield a row in both directions."""

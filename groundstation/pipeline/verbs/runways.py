@@ -37,7 +37,10 @@ class TableInUse:
 
 @dataclass(frozen=True)
 class NearRunway:
-    """Direction of a runway, and its distance from the place that was asked for."""
+    """A direction of a runway, and its distance from the place asked for.
+
+    None where an airport was asked for.
+    """
 
     runway: RunwayDirection
     distance_m: float | None = None
@@ -117,7 +120,9 @@ def runways_of(ident: str) -> FoundRunways:
 
 
 def update_runways(file: Path, dated: str = "") -> TableInUse:
-    """Make the user's table of a downloaded ``runways.csv``; a failure keeps the old one.
+    """Make the user's table of a downloaded ``runways.csv``.
+
+    The one before it stays where that fails.
 
     ``dated`` is the ISO date of the file; empty: the day on which it was last modified.
 

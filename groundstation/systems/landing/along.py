@@ -75,11 +75,10 @@ def along_error(
         return refused("too little of the final on the glide path", int(used.sum()))
     error_m, fit_sigma_m, share = _at_the_threshold(distance_m, apart_m, settings)
     slope = math.tan(math.radians(runway.glide_angle_deg))
-    crossing_sigma_m = 0.0 if runway.placed_by == "site file" else settings.crossing_height_sigma_m
     parts = (
         ErrorPart("place of the threshold", runway.along_sigma_m or settings.threshold_sigma_m),
         ErrorPart("zero of the height", zero_sigma_m / slope),
-        ErrorPart("height of the path over the threshold", crossing_sigma_m / slope),
+        ErrorPart("height of the path over the threshold", settings.crossing_height_sigma_m / slope),
         ErrorPart("height of the antenna", settings.reference_height_sigma_m / slope),
         ErrorPart("rounding of the positions", _rounding_along_m(positions, runway, settings)),
         ErrorPart("scatter, angle and scale of the height", fit_sigma_m),
@@ -117,10 +116,9 @@ def _height_of_antenna(
         return height_m, settings.height_zero_sigma_m
     ground_m = float(np.median(relative.height_m[rolling]))
     behind_m = -float(np.median(relative.distance_m[rolling]))
-    unknown = 0.5 * settings.runway_slope if runway.slope is None else 0.25 * settings.runway_slope
     rise_m = (runway.slope or 0.0) * behind_m
     scatter_m = float(np.std(relative.height_m[rolling]))
-    return height_m - ground_m + rise_m, math.hypot(unknown * abs(behind_m), scatter_m, 1.0)
+    return height_m - ground_m + rise_m, math.hypot(0.5 * settings.runway_slope * abs(behind_m), scatter_m, 1.0)
 
 
 def _distance_by_path(height_m: FloatArray, dots: FloatArray, runway: RunwayUsed) -> FloatArray:

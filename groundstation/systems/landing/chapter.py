@@ -48,6 +48,7 @@ from groundstation.systems.landing.answer import (
     StabilisedAt,
     TouchdownByStates,
 )
+from groundstation.systems.landing.runway_chapter import along_facts, along_told, runway_facts
 
 LEAD = "How each approach was flown against its runway, and where it touched down."
 SOURCES = (
@@ -66,7 +67,9 @@ HOW = (
     f"begins. Deviations are converted to metres by the course sector ({DOTS_PER_FULL_SCALE:g} dots to its edge) and "
     f"by {GLIDE_SLOPE_DOT:g} of the glide angle per dot. If runway and localizer are known, position minus localizer "
     "is the error across the course, without GNSS: generalised least squares, with tolerances of course line, bends, "
-    "width, steps and runway bearing in the covariance."
+    "width, steps and runway bearing in the covariance. Height and glide path give the error along the course. The "
+    "runway is that of the site file, else the likeliest of the table of runways (OurAirports, public domain, "
+    "unofficial), whose uncertainty is in the intervals."
 )
 REMEDIES: Remedies = (("no position of the aircraft", ("Record", "positions")),)
 
@@ -103,7 +106,7 @@ def _claim(answer: LandingResult) -> Claim | None:
     return Claim(
         Rank.LANDING_OPEN if state.text == NOT_MEASURED else Rank.LANDING,
         Mark(state.tone, state.text.capitalize()),
-        f"{_name(one).capitalize()}: {state.text}",
+        f"{_name(one)[:1].upper()}{_name(one)[1:]}: {state.text}",
         value=state.text.capitalize(),
         remark=_name(one),
         sentences=(f"{_why(one)}{also}",),
@@ -202,9 +205,12 @@ def _approach(one: Approach, answer: LandingResult) -> list[Part | None]:
         Note(f"Approach {one.number}, {_name(one)}. {_told(one)}"),
         Figure("landing.deviations", of),
         Figure("landing.final", of),
+        Figure("landing.runway", of) if one.runway.is_surveyed and one.runway.length_m else None,
+        runway_facts(one),
         _criteria(one, answer.settings.get("gate_floor_m")),
         _touchdown(one),
         *(_error(one, error) for error in one.position_errors),
+        *(along_facts(one, error) for error in one.along_errors),
         *(_height(one, error) for error in one.height_errors),
         Figure("landing.protection", of) if one.protection else None,
         _protection(one),
@@ -214,6 +220,7 @@ def _approach(one: Approach, answer: LandingResult) -> list[Part | None]:
 def _told(one: Approach) -> str:
     """Return what a reader must know before the figures."""
     told = [_accuracy(error) for error in one.position_errors[:2]]
+    told += filter(None, (along_told(error) for error in one.along_errors[:2]))
     if one.protection is not None:
         told.append(
             "No reference: protection levels bound the error at the integrity that the receiver claims; they are not "

@@ -17,6 +17,7 @@ from groundstation.results.flight import FlightResults
 from groundstation.results.landing_categories import CATEGORIES
 from groundstation.systems.landing.answer import Approach, LandingResult
 from groundstation.systems.landing.arrays import LandingPath, LandingProtection
+from groundstation.systems.landing.runway_plots import runway_from_above
 
 CATEGORY_ROLES: tuple[Role, ...] = ("series 5", "series 4", "series 7")
 LEAST_REACH_M, LINEAR_M = 30.0, 20.0
@@ -216,5 +217,6 @@ PLOTS: Mapping[str, Describe] = {
     "landing.deviations": deviations,
     "landing.final": final,
     "landing.motion": motion,
+    "landing.runway": runway_from_above,
     "landing.protection": protection,
 }

@@ -56,6 +56,18 @@ def _study_approach() -> "Callable[..., StudyResult]":
     return study_approach
 
 
+def _study_runways() -> "Callable[..., StudyResult]":
+    from groundstation.systems.landing.runway_study import study_runways
+
+    return study_runways
+
+
+def _study_along() -> "Callable[..., StudyResult]":
+    from groundstation.systems.landing.along_study import study_along
+
+    return study_along
+
+
 SYSTEM = System(
     name="landing",
     analyses=(LANDING, LANDING_BEACONS),
@@ -64,6 +76,10 @@ SYSTEM = System(
             "approach",
             "recorded approaches: the localizer as a reference for positions, how honest its interval is",
             _study_approach,
+        ),
+        Study("along", "recorded approaches: the glide path as a reference along the course", _study_along),
+        Study(
+            "runways", "choice of the runway from the table: how often one is named, and the right one", _study_runways
         ),
     ),
     chapters=_chapters,

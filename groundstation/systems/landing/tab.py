@@ -7,12 +7,15 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from groundstation.base.geodesy import continuous_longitude_deg, latitude_longitude_deg
 from groundstation.chapters.markdown import markdown
 from groundstation.results.flight import FlightResults
 from groundstation.results.landing_categories import CATEGORIES
 from groundstation.systems.landing.answer import Approach, LandingResult
 from groundstation.systems.landing.arrays import LandingPath
 from groundstation.systems.landing.chapter import landing as chapter
+from groundstation.systems.landing.runway_answer import RunwayUsed
+from groundstation.systems.landing.runway_plots import USUAL_WIDTH_M
 from groundstation.viewer import colours
 from groundstation.viewer.plot_views import panels_of, plot_of, runs_of
 from groundstation.viewer.recorder import Recorder
@@ -44,7 +47,8 @@ def landing(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
 
 def _approach(recorder: Recorder, results: FlightResults, one: Approach, data: LandingPath) -> rrb.Container:
     flown, path = data.where(data.approach == one.number), f"landing/{one.number}"
-    left = _space(recorder, f"{path}/space", flown)
+    left = _space(recorder, f"{path}/space", flown, one.runway)
+    _on_the_map(recorder, one)
     motion = plot_of(recorder, "landing.motion", results, str(one.number))
     left += [view for run in runs_of(recorder, motion, f"{path}/motion") for view in run]
     told = plot_of(recorder, "landing.protection", results, str(one.number))
@@ -61,7 +65,33 @@ def _place(along_m: FloatArray, across_m: FloatArray, height_m: FloatArray) -> F
     return np.column_stack([along_m, -ENLARGED * across_m, ENLARGED * height_m]).astype(np.float32)
 
 
-def _space(recorder: Recorder, path: str, flown: LandingPath) -> list[rrb.View]:
+def _on_the_map(recorder: Recorder, one: Approach) -> None:
+    """Log the outline of the runway on the map of the track."""
+    runway = one.runway
+    if not runway.is_surveyed or not runway.length_m:
+        return
+    course = np.deg2rad(runway.true_course_deg)
+    along, across = _outline(runway).T
+    north, east = (
+        along * np.cos(course) - across * np.sin(course),
+        along * np.sin(course) + across * np.cos(course),
+    )
+    latitude, longitude = latitude_longitude_deg(north, east, runway.latitude_deg, runway.longitude_deg)
+    strip = np.column_stack([latitude, continuous_longitude_deg(longitude)])
+    line = rr.GeoLineStrings(lat_lon=[strip], colors=[colours.ANSWER], radii=rr.Radius.ui_points(EDGE))
+    recorder.static(f"map/runway/{one.number}", line)
+
+
+def _outline(runway: RunwayUsed) -> FloatArray:
+    """Return the corners of a runway, forward and right of the threshold, with a bar at the threshold."""
+    half_m = 0.5 * (runway.width_m or USUAL_WIDTH_M)
+    first = -(runway.displaced_m or 0.0)
+    last = first + (runway.length_m or 0.0)
+    corners = [(0.0, -half_m), (0.0, half_m), (first, half_m), (first, -half_m), (last, -half_m), (last, half_m)]
+    return np.array([*corners, (0.0, half_m)])
+
+
+def _space(recorder: Recorder, path: str, flown: LandingPath, runway: RunwayUsed) -> list[rrb.View]:
     """Log the end of the final between the frames of the categories.
 
     One track is by positions (grey), one by the guidance. The aircraft moves where the guidance has it, else along the
@@ -98,6 +128,12 @@ def _space(recorder: Recorder, path: str, flown: LandingPath) -> list[rrb.View]:
     recorder.static(
         f"{path}/course", rr.LineStrips3D([ground], colors=[colours.LIGHT], radii=rr.Radius.ui_points(EDGE))
     )
+    if runway.is_surveyed and runway.length_m:
+        along, across = _outline(runway).T
+        strip = rr.LineStrips3D(
+            [_place(along, across, np.zeros(len(along)))], colors=[colours.SAMPLES], radii=rr.Radius.ui_points(TRAIL)
+        )
+        recorder.static(f"{path}/runway", strip)
     mark = rr.Points3D.from_fields(colors=[colours.ANSWER], radii=rr.Radius.ui_points(MARK))
     recorder.static(f"{path}/aircraft", mark)
     indexes = recorder.indexes(recorder.time_ns(flown.time_s[seen]))
