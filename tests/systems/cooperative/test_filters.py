@@ -307,7 +307,9 @@ def test_one_aircraft_alone_is_a_single_filter_in_every_algorithm() -> None:
     single = replace(GLOBAL, aircraft=GLOBAL.aircraft[:1])
     simulated = simulate_session(single, 8)
     settings = believed(single)
-    runs = [run_algorithm(prepare(simulated.session, settings), settings, name) for name in ALGORITHMS if name != "smoothed"]
+    runs = [
+        run_algorithm(prepare(simulated.session, settings), settings, name) for name in ALGORITHMS if name != "smoothed"
+    ]
     reference = runs[list(ALGORITHMS).index("centralised")].tracks[0]
     for run in runs[1:]:
         assert run.tracks[0].position_m == pytest.approx(reference.position_m, abs=1e-3)

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from groundstation.systems.cooperative.plain.observation import rows_of
+from groundstation.systems.cooperative.plain.steps import MeasurementEvent
 
 from groundstation.base.compile import Loop
 from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_scenario import SessionScenario
 from groundstation.systems.cooperative.events import Prepared, prepare
 from groundstation.systems.cooperative.loop_types import HEIGHT, PEER, POINT
-from groundstation.systems.cooperative.plain.observation import rows_of
-from groundstation.systems.cooperative.plain.steps import MeasurementEvent
 from groundstation.systems.cooperative.settings import (
     CameraBelief,
     CooperativeSettings,
