@@ -53,6 +53,7 @@ KINDS: Mapping[str, CriterionKind] = MappingProxyType(
         "landing_load": CriterionKind("peak load at the touchdown", "g", "landing", f"{_EASA}: normal acceleration"),
     }
 )
+REVERSED = "read as its reverse: it says down in flight alone, and not on the wheels"
 EDITIONS = (
     "FSF ALAR Briefing Note 7.1: Flight Safety Digest, August to November 2000. EASA GM2 ORO.AOC.130: ED Decision "
     "2025/020/R; it lists events and leaves limits to operator and type. Transport Canada AC 525-008, issue 1 (2004), "

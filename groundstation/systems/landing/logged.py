@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.systems.landing.criteria_answer import REVERSED
 from groundstation.systems.landing.path import FlightPath
 from groundstation.tables.resample import join, values_at
 from groundstation.tables.sources import sources_of_kind
@@ -17,7 +18,6 @@ LONGEST_HOLD_S = 10.0  # a switch or a flap is logged as seldom as every 4 s
 LARGEST_GAP_S = 10.0  # between samples of the wind
 SLOW_MPS = 10.0  # no aeroplane flies so slowly
 FEWEST_ON_GROUND = 10
-REVERSED = "read as its reverse: it says down in flight alone, and not on the wheels"
 GEAR = ("gear_down", "gear_nose_down", "gear_left_down", "gear_right_down")
 THRUST = ("n1_share", "power_share", "throttle_share")
 

@@ -14,10 +14,10 @@ from groundstation.systems.landing.answer import (
     StabilisedVerdict,
     StabilityLost,
 )
-from groundstation.systems.landing.criteria_answer import Criterion, Place
+from groundstation.systems.landing.criteria_answer import REVERSED, Criterion, Place
 from groundstation.systems.landing.criteria_settings import Limits
 from groundstation.systems.landing.geometry import RelativeToRunway
-from groundstation.systems.landing.logged import REVERSED, Logged
+from groundstation.systems.landing.logged import Logged
 from groundstation.systems.landing.path import FlightPath
 from groundstation.systems.landing.settings import LandingSettings
 from groundstation.systems.landing.sustained import lasting, worst_sustained
