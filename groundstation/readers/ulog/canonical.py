@@ -193,7 +193,7 @@ def _height(rows: NumericColumns) -> Columns:
 
 
 def _throttle(rows: NumericColumns) -> Columns:
-    """Throttle that the controllers ask for: actuator_controls.msg to 1.13, group 0, index 3."""
+    """Throttle that the controllers ask for: index 3 of msg/actuator_controls.msg."""
     return {"throttle_share": Column(rows["control[3]"])}
 
 

@@ -1,7 +1,7 @@
 """Recorded approaches as an analysis: every final of a flight against its runway."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,6 +31,7 @@ from groundstation.systems.landing.answer import (
 )
 from groundstation.systems.landing.arrays import LandingPath, LandingProtection
 from groundstation.systems.landing.columns import COLUMNS
+from groundstation.systems.landing.criteria import criteria_of, score_of
 from groundstation.systems.landing.finals import Final, ends_of, final_of
 from groundstation.systems.landing.findings import findings_of
 from groundstation.systems.landing.geometry import (
@@ -44,6 +45,7 @@ from groundstation.systems.landing.geometry import (
     samples_of_final,
 )
 from groundstation.systems.landing.height import height_error
+from groundstation.systems.landing.logged import Logged, logged_of
 from groundstation.systems.landing.path import FlightPath, path_of, position_topics, step_of
 from groundstation.systems.landing.protection import protection_along
 from groundstation.systems.landing.reference import (
@@ -76,13 +78,16 @@ class _Told:
 def _run(flight: "Flight", known: Known, settings: LandingSettings) -> Found[LandingResult]:
     path, finals, left_out = _finals(flight, known, settings)
     estimated = known.answer_meeting(StatesAlongTheFlight)
-    told = [_approach(number, flight, path, final, settings, estimated) for number, final in enumerate(finals, 1)]
+    logged = logged_of(flight, path)
+    told = [
+        _approach(number, flight, path, final, settings, estimated, logged) for number, final in enumerate(finals, 1)
+    ]
     approaches = tuple(one.approach for one in told)
     answer = LandingResult(
         approaches=approaches,
         left_out=left_out,
         remarks=(ACCURACY_ONLY,),
-        settings=asdict(settings),
+        settings=settings.told(),
         figures=_figures(told),
     )
     return Found(answer, findings_of(answer, known.runways_problem))
@@ -145,6 +150,7 @@ def _approach(
     final: Final,
     settings: LandingSettings,
     estimated: StatesAlongTheFlight | None,
+    logged: Logged,
 ) -> _Told:
     runway = runway_of(path, final, settings)
     relative = relative_to_runway(path, final, runway)
@@ -156,6 +162,9 @@ def _approach(
     errors, along = _position_errors(flight, path, final, runway, relative, source, sensitivity, settings)
     protection = protection_along(flight, path.time_s[final.first], final.end.time_s, number)
     lands = final.end.outcome == "landing"
+    touchdown = touchdown_of(flight, path, final, runway, relative, estimated) if lands else None
+    checks = stabilised(path, relative, logged, settings)
+    criteria = criteria_of(path, final, runway, relative, logged, touchdown, step_m, (errors, along), settings)
     approach = Approach(
         number=number,
         outcome=final.end.outcome,
@@ -170,14 +179,16 @@ def _approach(
         runway=runway,
         established=_guided_part(path, final, relative),
         sensitivity=sensitivity,
-        touchdown=touchdown_of(flight, path, final, runway, relative, estimated) if lands else None,
-        stabilised=stabilised(path, relative, settings),
+        touchdown=touchdown,
+        stabilised=checks,
         position_errors=errors,
         protection=None if protection is None else protection[0],
         claim=_claim(errors, runway),
         position_step_m=step_m if any(step_m) else None,
         along_errors=along,
         height_errors=_height_errors(flight, path, runway, final.end.time_s, settings) if lands else (),
+        criteria=criteria,
+        score=score_of(checks, criteria, settings),
     )
     return _Told(approach, samples_of_final(number, path, relative), None if protection is None else protection[1])
 

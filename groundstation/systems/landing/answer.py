@@ -6,6 +6,7 @@ from typing import ClassVar, Literal
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
+from groundstation.systems.landing.criteria_answer import Criterion, Place, Score
 from groundstation.systems.landing.runway_answer import RunwayUsed as RunwayUsed
 
 Outcome = Literal["landing", "go-around"]
@@ -98,11 +99,33 @@ StabilisedVerdict = Literal["stabilised", "not stabilised", "not measured"]
 
 
 @dataclass(frozen=True)
+class GatePlace:
+    """Instant at which the value of a criterion was found, by the criterion's name."""
+
+    name: str
+    at: Place
+
+
+@dataclass(frozen=True)
+class StabilityLost:
+    """First loss of a limit below a check height.
+
+    ``is_from_the_start``: it was not kept at the check height itself.
+    """
+
+    height_m: float
+    time_s: float
+    criterion: str
+    is_from_the_start: bool
+
+
+@dataclass(frozen=True)
 class StabilisedAt:
     """Criteria of a stabilised approach, from a check height down to the start of the flare.
 
     ``gates`` are the criteria; without any, ``reason`` says why none was measured. Criteria that are not in the log
-    leave the verdict to the others: it is stabilised if any was met and none failed.
+    leave the verdict to the others: it is stabilised if any was met and none failed. ``places`` says where the values
+    were found, ``lost`` where a limit was first left, ``stable_m`` the height from which all were kept for good.
     """
 
     height_m: float
@@ -110,6 +133,9 @@ class StabilisedAt:
     time_s: float | None
     gates: tuple[Gate, ...]
     reason: str = ""
+    places: tuple[GatePlace, ...] = ()
+    lost: StabilityLost | None = None
+    stable_m: float | None = None
 
 
 @dataclass(frozen=True)
@@ -296,6 +322,8 @@ class Approach:
     position_step_m: tuple[float, float] | None = None
     height_errors: tuple[HeightError, ...] = ()
     along_errors: tuple[AlongError, ...] = ()
+    criteria: tuple[Criterion, ...] = ()
+    score: Score | None = None
 
 
 @dataclass(frozen=True)

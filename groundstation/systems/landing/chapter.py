@@ -6,7 +6,7 @@ How each was flown, where it touched down, and what shows accuracy.
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import DOTS_PER_FULL_SCALE
 from groundstation.chapters.chapter import Remedies
-from groundstation.chapters.gates import limit_text, setting_facts, state_of
+from groundstation.chapters.gates import setting_facts
 from groundstation.chapters.parts import (
     Cell,
     Claim,
@@ -28,12 +28,10 @@ from groundstation.chapters.wording import (
     interval,
     is_number,
     number,
-    number_with_unit,
     percent,
     sentence,
     significant,
     typeset,
-    unit_sign,
 )
 from groundstation.results.flight import FlightResults
 from groundstation.systems.landing.answer import (
@@ -48,11 +46,13 @@ from groundstation.systems.landing.answer import (
     StabilisedAt,
     TouchdownByStates,
 )
+from groundstation.systems.landing.criteria_chapter import criteria_parts
 from groundstation.systems.landing.runway_chapter import along_facts, along_told, runway_facts
 
 LEAD = "How each approach was flown against its runway, and where it touched down."
 SOURCES = (
-    ("FSF ALAR", "Flight Safety Foundation, ALAR Briefing Note 7.1: deviations, sink rate, speed"),
+    ("FSF ALAR", "Flight Safety Foundation, ALAR Briefing Note 7.1: deviations, sink rate, speed, configuration"),
+    ("EASA GM2 ORO.AOC.130", "ED Decision 2025/020/R: events of flight data monitoring, without limits"),
     ("Airbus FOBN", "Airbus Flight Operations Briefing Notes: bank"),
     ("ICAO Annex 10", "Volume I, table 3.7.2.4-1: alarm limits; Satellite Navigation 1, 2020: accuracy"),
 )
@@ -207,7 +207,7 @@ def _approach(one: Approach, answer: LandingResult) -> list[Part | None]:
         Figure("landing.final", of),
         Figure("landing.runway", of) if one.runway.is_surveyed and one.runway.length_m else None,
         runway_facts(one),
-        _criteria(one, answer.settings.get("gate_floor_m")),
+        *criteria_parts(one, answer.settings.get("gate_floor_m")),
         _touchdown(one),
         *(_error(one, error) for error in one.position_errors),
         *(along_facts(one, error) for error in one.along_errors),
@@ -238,35 +238,6 @@ def _accuracy(error: PositionError) -> str:
             f"the course at the threshold (95 % {interval(error.confidence95_m, 0, 'm')}), right positive."
         )
     return f"Error of {error.topic} across the course not measured: {typeset(error.reason)}."
-
-
-def _criteria(one: Approach, floor_m: float | str | bool | None) -> Grid | None:
-    rows = [row for at in one.stabilised for row in _criterion_rows(at)]
-    if not rows:
-        return None
-    heads = (Head("From"), Head("State"), Head("Criterion"), Head("Worst", True), Head("Limit", True), Head("Reason"))
-    caption = (
-        f"Worst value from the check height down to {number(floor_m, 0, 'm')}. Limits: FSF ALAR Briefing Note 7.1 "
-        "(deviations, sink rate, speed), Airbus Flight Operations Briefing Notes (bank)."
-    )
-    return Grid(f"Approach {one.number}: stabilised?", heads, rows, caption)
-
-
-def _criterion_rows(at: StabilisedAt) -> list[tuple[Cell, ...]]:
-    height = number(at.height_m, 0, "m")
-    if not at.gates:
-        return [(height, Mark("unknown", "not measured"), "", ABSENT, ABSENT, sentence(at.reason))]
-    return [
-        (
-            height,
-            state_of(criterion),
-            criterion.title[:1].upper() + criterion.title[1:],
-            number_with_unit(significant(criterion.value, 3), unit_sign(criterion.unit)),
-            limit_text(criterion),
-            typeset(criterion.reason),
-        )
-        for criterion in at.gates
-    ]
 
 
 def _touchdown(one: Approach) -> Facts | None:

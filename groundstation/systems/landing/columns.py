@@ -50,6 +50,27 @@ def _at_the_low_check(one: Approach) -> str:
     return min(one.stabilised, key=lambda row: row.height_m).verdict
 
 
+def _criterion(name: str) -> Callable[[LandingResult], float | None]:
+    """Make a column of the value of one criterion of the last approach."""
+    return _last(lambda one: next((row.value for row in one.criteria if row.name == name), None))
+
+
+def _states(state: str) -> Callable[[Approach], str]:
+    """Return the names of all criteria of an approach that are in a state."""
+    gates = {"met": "passed", "not met": "failed"}
+
+    def of(one: Approach) -> str:
+        found = [gate.name for check in one.stabilised for gate in check.gates if gate.state == gates[state]]
+        found += [row.name for row in one.criteria if row.state == state]
+        return " ".join(dict.fromkeys(found))
+
+    return of
+
+
+def _score(one: Approach) -> float | None:
+    return one.score.share if one.score else None
+
+
 COLUMNS: tuple[AnswerColumn[LandingResult], ...] = (
     AnswerColumn("landing_approaches", "count", "approaches found", lambda landing: len(landing.approaches)),
     AnswerColumn(
@@ -63,6 +84,25 @@ COLUMNS: tuple[AnswerColumn[LandingResult], ...] = (
         "category",
         "the last approach from the lower check height down, by those criteria that the log has",
         _last(_at_the_low_check),
+    ),
+    AnswerColumn(
+        "landing_criteria_not_met", "text", "criteria of the last approach that are not met", _last(_states("not met"))
+    ),
+    AnswerColumn(
+        "landing_unstable_approaches",
+        "count",
+        "approaches not stabilised from the lower check height down",
+        lambda landing: sum(_at_the_low_check(one) == "not stabilised" for one in landing.approaches),
+    ),
+    AnswerColumn(
+        "landing_touchdown_m", "number", "last touchdown behind the threshold, as a criterion", _criterion("touchdown")
+    ),
+    AnswerColumn("landing_tailwind_mps", "number", "of the last approach, headwind negative", _criterion("tailwind")),
+    AnswerColumn(
+        "landing_score",
+        "number",
+        "by the user's own weights",
+        _last(_score),
     ),
     AnswerColumn(
         "landing_lateral_rms_dots",

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from groundstation.base.findings import Finding, Severity
 from groundstation.systems.landing.answer import Approach, LandingResult
+from groundstation.systems.landing.criteria_answer import REVERSED, Criterion
 from groundstation.systems.landing.reference import fits
 
 
@@ -21,6 +22,11 @@ def findings_of(answer: LandingResult, runways_problem: str = "") -> tuple[Findi
     return tuple(found)
 
 
+def _limits(one: Criterion) -> str:
+    ends = [f"{end:.1f}" for end in (one.at_least, one.at_most) if end is not None]
+    return " to ".join(ends)
+
+
 def _of(one: Approach) -> list[Finding]:
     place = f"{one.start_s:.0f} to {one.end_s:.0f} s"
     name = f"approach {one.number}"
@@ -30,6 +36,12 @@ def _of(one: Approach) -> list[Finding]:
         if failed:
             text = f"{name} not stabilised from {row.height_m:.0f} m down: {', '.join(failed)}"
             found.append(Finding("warn", "landing.not_stabilised", text, one.position_topic, place))
+    for criterion in one.criteria:
+        if criterion.state == "not met" and criterion.value is not None:
+            text = f"{name}: {criterion.kind.title} {criterion.value:.1f} {criterion.unit}, limit {_limits(criterion)}"
+            found.append(Finding("warn", "landing.criterion_not_met", text, one.position_topic, place))
+    if any(REVERSED in gate.reason for row in one.stabilised for gate in row.gates):
+        found.append(Finding("info", "landing.gear_reversed", f"{name}: gear {REVERSED}", "configuration", place))
     if one.sensitivity is not None and one.sensitivity.ratio is not None and not fits(one.sensitivity):
         ratio = one.sensitivity.ratio
         what = "another width of the course, or another runway"

@@ -4,15 +4,16 @@ FSF: Flight Safety Foundation, ALAR Briefing Note 7.1, Stabilized Approach (2000
 Notes, Flying Stabilized Approaches (2006). ICAO: Annex 10, volume I, 3.1.3 and 3.1.5.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Literal
 
 from groundstation.base.toml_settings import check_ranges, number
 from groundstation.base.units import M_PER_FOOT, MPS_PER_KNOT
+from groundstation.systems.landing.criteria_settings import CriteriaSettings
 
 Rounding = Literal["unknown", "nearest", "down"]
 # Settings that bound a criterion and choose no data: a change of them needs no log.
-LIMITS = frozenset({"deviation_max_dots", "sink_rate_max_mps", "bank_max_deg", "speed_above_max_mps"})
+LIMITS = frozenset({"deviation_max_dots", "sink_rate_max_mps", "bank_max_deg", "speed_above_max_mps", "criteria"})
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,16 @@ class LandingSettings:
     sink_rate_max_mps: float = number(1_000.0 * M_PER_FOOT / 60.0, 0.5, 30.0)  # FSF: no more than 1000 ft/min
     speed_above_max_mps: float = number(20.0 * MPS_PER_KNOT, 0.5, 100.0)  # FSF: reference + 20 kt
     bank_max_deg: float = number(7.0, 1.0, 60.0)  # Airbus
+    sustained_s: float = number(3.0, 0.0, 30.0)  # a value counts by what it keeps for so long: a gust is none
+    reference_speed_mps: float | None = number(None, 5.0, 200.0)  # VREF; none: the speed at the end stands for it
+    landing_flap_deg: float | None = number(None, 0.0, 90.0)  # least flap of a landing; none: that of the end
+    flap_tolerance_deg: float = number(2.0, 0.0, 20.0)
+    criteria: CriteriaSettings = field(default_factory=CriteriaSettings)
+
+    # What a criterion is not decided by: sigmas of our own, not of any standard.
+    ins_position_sigma_m: float = number(200.0, 0.0, 20_000.0)  # of recorded positions of an INS
+    wind_sigma_mps: float = number(2.5, 0.0, 20.0)  # of a recorded wind, along and across
+    height_sigma_m: float = number(1.0, 0.0, 20.0)  # of a height over the threshold
 
     # The localizer as reference: tolerances as 95 %, then sigmas of places and positions.
     course_line_m: float = number(10.5, 0.0, 100.0)  # at the threshold; ICAO 3.1.3.6.1: 7.5 and 3 m for II and III
@@ -81,3 +92,8 @@ class LandingSettings:
 
     def __post_init__(self) -> None:
         check_ranges(self)
+
+    def told(self) -> dict[str, float | str | bool]:
+        """Every setting that is set, by its key in the settings file."""
+        plain = {name: value for name, value in asdict(self).items() if name != "criteria" and value is not None}
+        return plain | self.criteria.told()

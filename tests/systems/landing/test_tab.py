@@ -63,13 +63,13 @@ def test_a_verdict_says_what_it_rests_on(with_site: FlightResults) -> None:
     answer = with_site.answer(LandingResult)
     assert answer is not None
     high, low = answer.approaches[-1].stabilised
-    states: tuple[GateState, ...] = ("passed", "not_measured", "passed", "not_measured", "not_measured")
+    states: tuple[GateState, ...] = ("passed", "not_measured", "passed", *["not_measured"] * 4)
     gates = tuple(replace(one, state=state) for one, state in zip(low.gates, states, strict=True))
     partly = replace(low, gates=gates, verdict=decide(gates))
     empty = tuple(replace(one, state="not_measured") for one in high.gates)
     said = claimed(with_site, high=replace(high, gates=empty, verdict=decide(empty)), low=partly)
     assert said == (
-        "From 305 m: not measured (no criterion is in the log). From 152 m: stabilised (2 of 5 criteria judged)."
+        "From 305 m: not measured (no criterion is in the log). From 152 m: stabilised (2 of 7 criteria judged)."
     )
     reason = "the straight final begins at 200 m"
     failed = tuple(replace(one, state="failed" if one.name == "bank" else one.state) for one in gates)

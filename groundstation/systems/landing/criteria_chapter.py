@@ -1,0 +1,155 @@
+"""Criteria of an approach as tables of its chapter: state, value, limit, place, source."""
+
+from collections.abc import Iterable
+
+from groundstation.base.quantiles import NORMAL_95
+from groundstation.chapters.gates import limit_text, state_of
+from groundstation.chapters.parts import Cell, Facts, Grid, Head, Mark, Note, Part, Tone
+from groundstation.chapters.wording import (
+    ABSENT,
+    number,
+    number_with_unit,
+    percent,
+    sentence,
+    significant,
+    typeset,
+    unit_sign,
+)
+from groundstation.systems.landing.answer import Approach, StabilisedAt
+from groundstation.systems.landing.criteria_answer import EDITIONS, KINDS, Criterion, Place
+
+TONES: dict[str, Tone] = {
+    "met": "good",
+    "not met": "warn",
+    "undecided": "unknown",
+    "no limit": "unknown",
+    "not measured": "unknown",
+    "not logged": "unknown",
+}
+HEADS = (
+    Head("State"),
+    Head("Criterion"),
+    Head("Value", True),
+    Head("Limit", True),
+    Head("Where"),
+    Head("Source; remark"),
+)
+GATE_STATES = {"passed": Mark("good", "met"), "failed": Mark("warn", "not met")}
+NO_VALUE = "not in the log"
+
+
+def criteria_parts(one: Approach, floor_m: float | str | bool | None) -> list[Part | None]:
+    """Return the tables of the check heights, of the runway, and the user's score."""
+    return [*(_check(one, at, floor_m) for at in one.stabilised), _rest(one), _score(one)]
+
+
+def _check(one: Approach, at: StabilisedAt, floor_m: float | str | bool | None) -> Grid | Note:
+    height = number(at.height_m, 0, "m")
+    if not at.gates:
+        return Note(f"Approach {one.number} from {height} down: not measured, {typeset(at.reason)}.")
+    places = {place.name: place.at for place in at.places}
+    rows: list[tuple[Cell, ...]] = []
+    for gate in at.gates:
+        if gate.state == "not_measured" and gate.reason == NO_VALUE:
+            continue
+        source = KINDS[gate.name].source if gate.name in KINDS else ""
+        rows.append(
+            (
+                GATE_STATES.get(gate.state) or state_of(gate),
+                gate.title[:1].upper() + gate.title[1:],
+                number_with_unit(significant(gate.value, 3), unit_sign(gate.unit)),
+                limit_text(gate),
+                _where(places.get(gate.name)),
+                _told(source, gate.reason),
+            )
+        )
+    rows += _not_logged(gate.title for gate in at.gates if gate.state == "not_measured" and gate.reason == NO_VALUE)
+    caption = f"The worst value that lasted, from {height} down to {number(floor_m, 0, 'm')}. {_kept(at)}"
+    return Grid(f"Approach {one.number}, from {height} down: {at.verdict}", HEADS, rows, caption)
+
+
+def _kept(at: StabilisedAt) -> str:
+    """Return where a limit was first left, and from where all were kept."""
+    if at.lost is None:
+        return "No limit was left." if at.stable_m is not None else ""
+    lost = at.lost
+    when = "at the check height already" if lost.is_from_the_start else f"at {number(lost.height_m, 0, 'm')}"
+    again = f"all kept again below {number(at.stable_m, 0, 'm')}" if at.stable_m is not None else "not regained"
+    return f"Stability lost {when} ({lost.criterion}); {again}."
+
+
+def _rest(one: Approach) -> Grid | None:
+    if not one.criteria:
+        return None
+    rows: list[tuple[Cell, ...]] = [
+        (
+            Mark(TONES[criterion.state], criterion.state),
+            criterion.kind.title[:1].upper() + criterion.kind.title[1:],
+            _value(criterion),
+            limits_text(criterion),
+            _where(criterion.at),
+            _told(criterion.kind.source, criterion.reason),
+        )
+        for criterion in one.criteria
+        if criterion.value is not None
+    ]
+    reasons = dict.fromkeys(criterion.reason for criterion in one.criteria if criterion.value is None)
+    for reason in reasons:
+        lacking = [row.kind.title for row in one.criteria if row.value is None and row.reason == reason]
+        rows += _not_logged(lacking, reason)
+    caption = (
+        "±: 95 %, where the value has an uncertainty; undecided: it reaches over the limit. No limit: that of "
+        f"the type or the operator, set in [landing.criteria]. {EDITIONS}"
+    )
+    return Grid(f"Approach {one.number}: wind, thrust, threshold and landing", HEADS, rows, caption)
+
+
+def _not_logged(titles: Iterable[str], reason: str = NO_VALUE) -> list[tuple[Cell, ...]]:
+    """Return one row for all that lack for one reason."""
+    listed = ", ".join(titles)
+    if not listed:
+        return []
+    state, told = ("not logged", "") if reason == NO_VALUE else ("not measured", reason)
+    return [(Mark("unknown", state), sentence(listed).rstrip("."), ABSENT, ABSENT, "", typeset(told))]
+
+
+def _value(one: Criterion) -> str:
+    text = number_with_unit(significant(one.value, 3), unit_sign(one.unit))
+    return f"{text} ± {significant(NORMAL_95 * one.sigma, 2)}" if one.sigma else text
+
+
+def limits_text(one: Criterion) -> str:
+    """Return the limits of a criterion with their sense.
+
+    Examples
+    --------
+    >>> limits_text(Criterion(name="tailwind", state="met", unit="m/s", value=1.0, at_most=5.0))
+    '≤ 5\u202fm/s'
+    """
+    unit = unit_sign(one.unit)
+    if one.at_least is not None and one.at_most is not None:
+        return number_with_unit(f"{significant(one.at_least, 4)} … {significant(one.at_most, 4)}", unit)
+    if one.at_most is not None:
+        return "≤ " + number_with_unit(significant(one.at_most, 4), unit)
+    return ABSENT if one.at_least is None else "≥ " + number_with_unit(significant(one.at_least, 4), unit)
+
+
+def _where(at: Place | None) -> str:
+    if at is None:
+        return ""
+    height = number(at.height_m, 0, "m up") if at.height_m is not None else ""
+    before = at.before_threshold_m
+    along = "" if before is None else number(abs(before) / 1000.0, 1, "km before" if before >= 0.0 else "km behind")
+    return ", ".join(filter(None, (height, along)))
+
+
+def _told(source: str, reason: str) -> str:
+    return "; ".join(filter(None, (typeset(source), typeset(reason))))
+
+
+def _score(one: Approach) -> Facts | None:
+    if one.score is None:
+        return None
+    score = one.score
+    told = f"of weights {number(score.judged, 1)} that were judged, {number(score.given, 1)} given"
+    return Facts(f"Approach {one.number}: score by your own weights", (("Met", percent(score.share), told),))
