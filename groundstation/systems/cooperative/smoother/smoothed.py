@@ -28,7 +28,7 @@ from groundstation.systems.cooperative.smoother.sight import OutputStates
 from groundstation.systems.cooperative.smoother.weights import Repetitions, cauchy, honest_factor, loss
 from groundstation.systems.cooperative.tracks import AlgorithmRun, JudgedMeasurements, VehicleTrack
 
-SETTLED = 0.02  # a last step that moves no state of the readings by more in all, in shares of a sigma, ends the passes
+SETTLED = 0.05  # a last step that moves no state of the readings by more in all, in shares of a sigma, ends the passes
 HALVINGS = 4
 MOST_RELATIVE = 12  # vehicles, up to which covariances of their places to one another are made
 
