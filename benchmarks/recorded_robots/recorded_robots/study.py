@@ -25,6 +25,7 @@ from groundstation.systems.cooperative.settings import (
     CooperativeSettings,
     InsBelief,
     OdometryBelief,
+    SmootherSettings,
 )
 from groundstation.systems.cooperative.tracks import AlgorithmRun
 from groundstation.systems.study import StudyResult, grid, section, table
@@ -51,6 +52,7 @@ SETTINGS = {
         gate_sigma=4.0,
         latency_slots=0,
         map_window_s=1e6,
+        smoother=SmootherSettings(pair_bias_m=0.03),
     ),
 }
 SETTINGS["miluv"] = CooperativeSettings(
@@ -65,7 +67,12 @@ SETTINGS["miluv"] = CooperativeSettings(
     map_window_s=1e6,
 )
 SETTINGS["murp"] = replace(
-    SETTINGS["miluv"], range_bias_m=0.15, range_bias_s=20.0, correlated_share=0.5, gate_sigma=4.0
+    SETTINGS["miluv"],
+    range_bias_m=0.15,
+    range_bias_s=20.0,
+    correlated_share=0.5,
+    gate_sigma=4.0,
+    smoother=SmootherSettings(pair_bias_m=0.1),
 )
 _SIMULATED = (
     "dead reckoning is simulated, for the data hold none: truth with a start off by 0.1 m along each axis, "
