@@ -10,12 +10,14 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.base.records import BoolArray, Int64Array
+from groundstation.base.units import LIGHT_MPS
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.loop_types import HEIGHT, PEER, POINT, SATELLITE, Events
-from groundstation.systems.cooperative.observation import LIGHT_MPS, NEAREST_M
 from groundstation.systems.cooperative.smoother.knots import Knots
 from groundstation.systems.cooperative.smoother.layout import Layout, pair_of
 from groundstation.systems.cooperative.smoother.sight import Ends, RangeErrors
+
+NEAREST_M = 1e-3  # a source on top of the receiver has no direction
 
 
 @dataclass(frozen=True, slots=True)
