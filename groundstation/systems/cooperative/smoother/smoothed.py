@@ -8,7 +8,9 @@ over the knots.
 Source: Barfoot, State Estimation for Robotics, 2nd ed. 2024, chapters 3 to 5 (batch, robust costs).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -22,11 +24,13 @@ from groundstation.systems.cooperative.smoother.forward import Doubts, doubt_blo
 from groundstation.systems.cooperative.smoother.knots import knots_of
 from groundstation.systems.cooperative.smoother.layout import layout_of
 from groundstation.systems.cooperative.smoother.rows import Linearised, Rows
+from groundstation.systems.cooperative.smoother.sight import OutputStates
 from groundstation.systems.cooperative.smoother.weights import Repetitions, cauchy, honest_factor, loss
 from groundstation.systems.cooperative.tracks import AlgorithmRun, JudgedMeasurements, VehicleTrack
 
 SETTLED = 0.02  # a last step that moves no state of the readings by more in all, in shares of a sigma, ends the passes
 HALVINGS = 4
+MOST_RELATIVE = 12  # vehicles, up to which covariances of their places to one another are made
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,8 @@ class SmoothedRun:
     ----------
     run : AlgorithmRun
     points : tuple of SmoothedPoint
+    relative : dict of (vehicle, vehicle) to (time_s (n,), covariance (n, 2, 2))
+        Covariance of the place of one vehicle to another, north and east; empty for more than ``MOST_RELATIVE``.
     passes : int
     has_settled : bool
         Whether the last step was small.
@@ -62,6 +68,7 @@ class SmoothedRun:
 
     run: AlgorithmRun
     points: tuple[SmoothedPoint, ...]
+    relative: Mapping[tuple[int, int], tuple[FloatArray, FloatArray]]
     passes: int
     has_settled: bool
 
@@ -82,6 +89,17 @@ def run_smoothed(prepared: Prepared, settings: CooperativeSettings, *, innovates
 def smooth(prepared: Prepared, settings: CooperativeSettings, *, innovates: bool = True) -> SmoothedRun:
     """Smooth a session; see :func:`run_smoothed`."""
     return _Smoother(prepared, settings).run(innovates=innovates)
+
+
+_Output = tuple[FloatArray, Int64Array, OutputStates]  # times, knots among those of outputs, states
+
+
+def _relative(one: _Output, two: _Output, shared: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return times that two vehicles have outputs at, and the covariance of their places to one another."""
+    time_s, at, to = np.intersect1d(one[0], two[0], return_indices=True)
+    both = one[2].by_knot[at, :2] @ shared[one[1][at]] @ two[2].by_knot[to, :2].swapaxes(1, 2)
+    own = one[2].covariance[at, :2, :2] + two[2].covariance[to, :2, :2]
+    return time_s, own - both - both.swapaxes(1, 2)
 
 
 class _Smoother:
@@ -214,33 +232,41 @@ class _Smoother:
     def _finish(self, x: FloatArray, seen: Linearised, passes: int, has_settled: bool) -> SmoothedRun:
         layout, knots, prepared = self._layout, self._knots, self._prepared
         blocks = [np.empty((len(x), layout.groups[g].size, layout.groups[g].size)) for g, _, _ in layout.of_vehicle]
+        pairs = list(combinations(range(len(blocks)), 2)) if len(blocks) <= MOST_RELATIVE else []
+        asked = {knot: number for number, knot in enumerate(np.unique(knots.output_knot).tolist())}
+        shared = {
+            (i, j): np.empty((len(asked), blocks[i].shape[1], blocks[j].shape[1])) for i, j in pairs
+        }  # of two vehicles, at the knots of outputs
         points: list[SmoothedPoint] = []
         for knot, P, _L, behind in Chain(self._problem(x, seen, honest=True)).covariances():
             for vehicle in range(len(blocks)):
                 blocks[vehicle][knot] = block(P, behind, layout.of(vehicle))
+            for i, j in pairs if knot in asked else ():
+                one, two = layout.of(i), layout.of(j)
+                shared[i, j][asked[knot]] = P[one, two] - behind[one] @ P[:, two]
             if not knot:
                 for point in np.flatnonzero(layout.points >= 0).tolist():
                     at = slice(int(layout.points[point]), int(layout.points[point]) + 2)
                     points.append(SmoothedPoint(point, x[0, at].copy(), block(P, behind, at)))
-        tracks = []
-        for vehicle, one in enumerate(prepared.vehicles):
+        tracks, outputs = [], []
+        for vehicle, one_vehicle in enumerate(prepared.vehicles):
             mine = knots.output_vehicle == vehicle
-            time_s, knot = knots.output_s[mine], knots.output_knot[mine]
+            time_s, knot_of = knots.output_s[mine], knots.output_knot[mine]
             group, index, _ = layout.of_vehicle[vehicle].tolist()
-            position, state, covariance = layout.groups[group].states_at(
-                index, time_s, knot, x[knot][:, layout.of(vehicle)], blocks[vehicle][knot]
+            out = layout.groups[group].states_at(
+                index, time_s, knot_of, x[knot_of][:, layout.of(vehicle)], blocks[vehicle][knot_of]
             )
-            tracks.append(VehicleTrack(one.name, time_s, position, state, covariance, one.height))
-        run = AlgorithmRun(
-            "smoothed",
-            "batch",
-            tuple(tracks),
-            *self._judged(seen),
-            {},
-            np.zeros(0),
-            np.zeros(0),
-        )
-        return SmoothedRun(run, tuple(points), passes, has_settled)
+            outputs.append((time_s, np.array([asked[one] for one in knot_of.tolist()], dtype=np.int64), out))
+            tracks.append(
+                VehicleTrack(one_vehicle.name, time_s, out.position_m, out.state, out.covariance, one_vehicle.height)
+            )
+        judged, counts = self._judged(seen)
+        run = AlgorithmRun("smoothed", "batch", tuple(tracks), judged, counts, {}, np.zeros(0), np.zeros(0))
+        signs = [1.0 if vehicle.heading >= 0 else -1.0 for vehicle in prepared.vehicles]  # a place, or its error
+        relative = {
+            (i, j): _relative(outputs[i], outputs[j], signs[i] * signs[j] * both) for (i, j), both in shared.items()
+        }
+        return SmoothedRun(run, tuple(points), relative, passes, has_settled)
 
     def _judged(self, seen: Linearised) -> tuple[JudgedMeasurements, dict[str, int]]:
         """Return residuals over the spread of one reading; those beyond the gate count as gated."""
