@@ -24,10 +24,10 @@ from groundstation.base.findings import Finding
 from groundstation.base.records import frozen
 from groundstation.systems.cooperative.answer import AlgorithmRow
 from groundstation.systems.cooperative.events import Prepared
-from groundstation.systems.cooperative.loop_types import PEER, POINT
 from groundstation.systems.cooperative.filters.observation import LinearisedMeasurement, rows_of
 from groundstation.systems.cooperative.filters.pairwise import after_over_before
 from groundstation.systems.cooperative.filters.steps import MeasurementEvent, steps
+from groundstation.systems.cooperative.loop_types import PEER, POINT
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.tracks import VehicleTrack
 
