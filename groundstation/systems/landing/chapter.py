@@ -134,6 +134,7 @@ def _rests_on(at: StabilisedAt) -> str:
 def _figures(one: Approach) -> tuple[tuple[str, str, str], ...]:
     on, down = one.established, one.touchdown
     error = next((row for row in one.position_errors if row.state == "measured"), None)
+    along = next((row for row in one.along_errors if row.state == "measured"), None)
     found = (
         ("Off the course", number(on.lateral_rms_dots, 2, "dot") if on else ABSENT, "RMS while established"),
         ("Off the path", number(on.vertical_rms_dots, 2, "dot") if on else ABSENT, "RMS while established"),
@@ -142,6 +143,11 @@ def _figures(one: Approach) -> tuple[tuple[str, str, str], ...]:
             "Positions across the course",
             number(error.error_m, 0, "m", signed=True) if error else ABSENT,
             f"{error.topic} by the localizer; 95 % {interval(error.confidence95_m, 0, 'm')}" if error else "",
+        ),
+        (
+            "Positions along the course",
+            number(along.error_m, 0, "m", signed=True) if along else ABSENT,
+            f"{along.topic} by the glide path; 95 % {interval(along.confidence95_m, 0, 'm')}" if along else "",
         ),
     )
     return tuple(figure for figure in found if figure[1] != ABSENT)

@@ -5,6 +5,7 @@ from typing import TypeVar
 
 from groundstation.results.columns import AnswerColumn
 from groundstation.systems.landing.answer import (
+    AlongError,
     Approach,
     Established,
     HeightError,
@@ -33,6 +34,15 @@ def _measured(value: Callable[[PositionError], float | None]) -> Callable[[Landi
 
     def of_approach(one: Approach) -> float | None:
         return next((value(error) for error in one.position_errors if error.state == "measured"), None)
+
+    return _last(of_approach)
+
+
+def _along(value: Callable[[AlongError], float | None]) -> Callable[[LandingResult], float | None]:
+    """Make a column of the first topic whose error along the course the glide path measured."""
+
+    def of_approach(one: Approach) -> float | None:
+        return next((value(error) for error in one.along_errors if error.state == "measured"), None)
 
     return _last(of_approach)
 
@@ -78,6 +88,12 @@ COLUMNS: tuple[AnswerColumn[LandingResult], ...] = (
         "count",
         "of these, go-arounds",
         lambda landing: sum(one.outcome == "go-around" for one in landing.approaches),
+    ),
+    AnswerColumn(
+        "landing_runway",
+        "category",
+        "airport and runway of the last approach, by the site file or the table of runways",
+        _last(lambda one: one.runway.name or None),
     ),
     AnswerColumn(
         "landing_stabilised",
@@ -127,6 +143,13 @@ COLUMNS: tuple[AnswerColumn[LandingResult], ...] = (
         _measured(lambda error: error.error_m),
     ),
     AnswerColumn("landing_position_error_sigma_m", "number", "its sigma", _measured(lambda error: error.sigma_m)),
+    AnswerColumn(
+        "landing_along_error_m",
+        "number",
+        "of the recorded positions along the course of the last approach, by the glide path, forward positive",
+        _along(lambda error: error.error_m),
+    ),
+    AnswerColumn("landing_along_error_sigma_m", "number", "its sigma", _along(lambda error: error.sigma_m)),
     AnswerColumn(
         "landing_height_error_m",
         "number",

@@ -58,6 +58,10 @@ def _of(one: Approach) -> list[Finding]:
         if error.state == "measured" and error.error_m is not None and error.sigma_m is not None:
             text = f"{name}: {error.topic} is {error.error_m:+.0f} m across the course (sigma {error.sigma_m:.0f} m)"
             found.append(Finding("info", "landing.position_error", text, error.topic, place))
+    for along in one.along_errors:
+        if along.state == "measured" and along.error_m is not None and along.sigma_m is not None:
+            text = f"{name}: {along.topic} is {along.error_m:+.0f} m along the course (sigma {along.sigma_m:.0f} m)"
+            found.append(Finding("info", "landing.along_error", text, along.topic, place))
     for height in one.height_errors:
         if height.state == "measured" and height.error_m is not None and height.sigma_m is not None:
             text = f"{name}: altitude of {height.topic} is off by {height.error_m:+.1f} m on the runway"
