@@ -47,7 +47,7 @@ def heading_apart(first: UnitTrack, second: UnitTrack, grids: tuple[OnGrid, OnGr
 
 
 def _step(values: FloatArray, smallest: float = SMALLEST_DEG) -> float:
-    """Return the resolution of a series: its smallest change from value to value, 0 where it has none."""
+    """Return the smallest change of a series from value to value, 0 where it has none."""
     change = np.abs(np.diff(values))
     change = change[np.isfinite(change) & (change > smallest)]
     return float(change.min()) if len(change) else 0.0
