@@ -38,7 +38,7 @@ from groundstation.systems.magnetic.deviation_answer import (
     flux_deviation_of,
 )
 from groundstation.systems.magnetic.deviation_to_apply import Apply
-from groundstation.systems.magnetic.flux_advice import advise
+from groundstation.systems.magnetic.flux_advice_chapter import advise
 from groundstation.systems.magnetic.flux_answer import FluxDeviation
 from groundstation.systems.magnetic.flux_bank import followed, lean_error_deg
 from groundstation.systems.magnetic.flux_epochs import find_legs, gather_epochs
