@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from groundstation.base.angles import FloatArray
 from groundstation.base.records import Int64Array
 from groundstation.systems.cooperative.aircraft import Aircraft
 from groundstation.systems.cooperative.events import Prepared
@@ -30,7 +29,7 @@ def belief_factors(
     """Return the factor of each believed variance of INS and clocks, with the independent numbers it rests on."""
     found: dict[str, list[float]] = {}
     response = information.response
-    numbers, _, rank, _ = np.linalg.lstsq(information.matrix, information.score, rcond=1e-9)
+    numbers, _, _, _ = np.linalg.lstsq(information.matrix, information.score, rcond=1e-9)
     value, axes = np.linalg.eigh(information.matrix)
     seen = value > 1e-9 * max(float(value[-1]), 1e-30)
     root = axes[:, seen] / np.sqrt(value[seen] * information.repetition)

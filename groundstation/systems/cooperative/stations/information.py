@@ -67,7 +67,9 @@ class StationInformation:
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
 
-def station_information(session: Session, settings: CooperativeSettings) -> tuple[StationInformation, SmoothedProblem, Prepared]:
+def station_information(
+    session: Session, settings: CooperativeSettings
+) -> tuple[StationInformation, SmoothedProblem, Prepared]:
     """Smooth a session and return what it tells of its stations, as the stations file has them."""
     known = tuple(
         point if point.position_sigma_m > 0.0 else replace(point, position_sigma_m=SURVEYED_M)
@@ -170,4 +172,8 @@ def honest_square(scale: float) -> float:
 def _nearest(time_s: FloatArray, at_s: FloatArray) -> np.ndarray:
     after = np.clip(np.searchsorted(time_s, at_s), 1, max(len(time_s) - 1, 1))
     before = after - 1
-    return np.where(at_s - time_s[before] < time_s[np.minimum(after, len(time_s) - 1)] - at_s, before, np.minimum(after, len(time_s) - 1))
+    return np.where(
+        at_s - time_s[before] < time_s[np.minimum(after, len(time_s) - 1)] - at_s,
+        before,
+        np.minimum(after, len(time_s) - 1),
+    )

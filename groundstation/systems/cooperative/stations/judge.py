@@ -14,8 +14,9 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.ecef import geodetic_deg_m
 from groundstation.base.quantiles import NORMAL_95
+from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.settings import CooperativeSettings
-from groundstation.systems.cooperative.smoother.smoothed import SmoothedPoint
+from groundstation.systems.cooperative.smoother.smoothed import SmoothedPoint, SmoothedProblem
 from groundstation.systems.cooperative.stations.belief import belief_factors, raised_sigmas, with_factors
 from groundstation.systems.cooperative.stations.datums import DATUMS
 from groundstation.systems.cooperative.stations.hypotheses import (
@@ -31,7 +32,8 @@ from groundstation.systems.cooperative.stations.hypotheses import (
 from groundstation.systems.cooperative.stations.information import EACH, StationInformation, station_information
 from groundstation.tables.session import GroundPoint, Session
 
-MOST_ROUNDS, BELIEF_ROUNDS = 4, 3
+MOST_ROUNDS, BELIEF_ROUNDS = 4, 2
+Solved = tuple[StationInformation, SmoothedProblem, Prepared]
 DATUM_TOLD = 12.0  # twice the log of the likelihood ratio of a datum from which it is told
 DATUM_DECIDABLE = 20.0  # noncentrality: the datum's errors would be told in 95 % of sessions
 
@@ -78,7 +80,7 @@ class StationJudgement:
     asked : StationInformation
         With the stations as the file has them.
     tests : tuple of StationTest
-        Of the first round.
+        Of the last round in which each station was asked.
     doubts : tuple of Doubt
         In the order of the rounds.
     datums : tuple of DatumTest
@@ -144,36 +146,36 @@ class StationJudgement:
 
 def judge_stations(session: Session, settings: CooperativeSettings) -> StationJudgement:
     """Judge the stations of a session that has ranges to any."""
-    doubts: list[Doubt] = []
-    now, first, tests, datums = session, None, (), ()
-    believed, settings = settings, _believable(session, settings)
-    for number in range(MOST_ROUNDS + 1):
-        information, solved, _ = station_information(now, settings)
-        asked = [station for station in range(len(now.points)) if station not in {one.station for one in doubts}]
-        found = station_tests(information, asked)
-        if first is None:
-            first, tests, datums = information, found, datum_tests(now, information, found)
-        if number == MOST_ROUNDS or not alarms(found):
+    raised, (information, solved, _) = _believable(session, settings)
+    now, doubts = session, list[Doubt]()
+    found = station_tests(information, range(len(session.points)))
+    first, tests, datums = information, found, datum_tests(session, information, found)
+    for number in range(MOST_ROUNDS):
+        if not alarms(found):
             break
         fresh = _doubts(found, number)
         doubts += fresh
         now = _without(now, fresh)
-    assert first is not None
+        information, solved, _ = station_information(now, raised)
+        in_doubt = {one.station for one in doubts}
+        found = station_tests(information, [one for one in range(len(now.points)) if one not in in_doubt])
+        tests = (*(test for test in tests if test.station in in_doubt), *found)
     stated = {point for point, one in enumerate(now.points) if one.position_sigma_m > 0.0}
     surveyed = tuple(point for point in solved.smoothed.points if point.point in stated)
-    raised = raised_sigmas(believed.ins, settings.ins)
-    return StationJudgement(first, tests, tuple(doubts), datums, now, information, surveyed, raised)
+    factors = raised_sigmas(settings.ins, raised.ins)
+    return StationJudgement(first, tests, tuple(doubts), datums, now, information, surveyed, factors)
 
 
-def _believable(session: Session, settings: CooperativeSettings) -> CooperativeSettings:
+def _believable(session: Session, settings: CooperativeSettings) -> tuple[CooperativeSettings, Solved]:
     """Return settings with sigmas of INS and clocks as large as the session shows them, the stations being free."""
+    solved = station_information(session, settings)
     for _ in range(BELIEF_ROUNDS):
-        information, solved, prepared = station_information(session, settings)
-        raised = with_factors(settings, belief_factors(prepared, solved, information))
+        information, smoothed, prepared = solved
+        raised = with_factors(settings, belief_factors(prepared, smoothed, information))
         if raised == settings:
             break
-        settings = raised
-    return settings
+        settings, solved = raised, station_information(session, raised)
+    return settings, solved
 
 
 def _doubts(found: Sequence[StationTest], number: int) -> list[Doubt]:
