@@ -241,7 +241,7 @@ def _point(stations: Stations, place: int) -> GroundPoint:
     if stations.origin is not None:
         position = stations.origin.from_ecef_m(position)
     x, y, z = position.tolist()
-    return GroundPoint(one.name, (x, y, z), one.position_sigma_m)
+    return GroundPoint(one.name, (x, y, z), one.position_sigma_m, (one.latitude_deg, one.longitude_deg))
 
 
 def _ranks(flights: Mapping[str, Flight], stations: Stations) -> dict[str, int]:

@@ -23,6 +23,7 @@ from groundstation.results.arrays.session import SessionClocks
 from groundstation.results.fleet import SessionRow
 from groundstation.results.flight import FlightResults
 from groundstation.systems.cooperative.answer import AlgorithmRow, CooperativeResult, LinkRow
+from groundstation.systems.cooperative.stations_chapter import stations_parts, stations_warning
 
 TITLE = "Navigation between aircraft"
 LEAD = (
@@ -84,9 +85,12 @@ def cooperative(results: FlightResults) -> Section | None:
     if answer is None:
         return without_answer(results, "cooperative", TITLE, LEAD)
     best = trusted(answer)
+    warning = stations_warning(answer)
     parts: list[Part | None] = [
+        Note(warning, "warn") if warning else None,
         _advice(answer, best),
         _algorithms(answer, best),
+        *stations_parts(answer),
         _costs(answer),
         Figure("cooperative.map"),
         _vehicles(answer, best),
@@ -177,7 +181,7 @@ def session_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -
         pairs,
         verdict=state_of(best),
         headline=f"{title_of(best.algorithm)}: 2σ_r {number(best.two_sigma_r_m, 1, 'm')}",
-        sentences=(_reason(answer, best),),
+        sentences=tuple(text for text in (stations_warning(answer), _reason(answer, best)) if text),
         figures=tuple(figures),
     )
 

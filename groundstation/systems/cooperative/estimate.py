@@ -17,6 +17,7 @@ from groundstation.systems.cooperative.expected_honesty import HonestyCheck, che
 from groundstation.systems.cooperative.geometry import Geometry, Truth, bound_of, geometry_of
 from groundstation.systems.cooperative.loop_types import KINDS, PEER, POINT, USED
 from groundstation.systems.cooperative.settings import ALGORITHMS, CooperativeSettings
+from groundstation.systems.cooperative.stations.rows import station_findings, with_stations_judged
 from groundstation.systems.cooperative.tracks import AlgorithmRun, VehicleTrack
 from groundstation.tables.session import Session
 
@@ -66,6 +67,7 @@ def estimate_session(
     """
     prepared = prepare(session, settings)
     require_vehicles(prepared)
+    prepared, stations = with_stations_judged(prepared, settings)
     truth = truth or {}
     judged: list[JudgedRun] = []
     checks: dict[str, HonestyCheck] = {}
@@ -79,7 +81,12 @@ def estimate_session(
     bound = bound_of(prepared.session, settings, truth)
     smoothing_bound = bound_of(prepared.session, settings, truth, DEFAULT) if DEFAULT in algorithms else bound
     geometry = geometry_of(prepared.session, settings, default.run)
-    findings = [*prepared.findings, *_findings(judged, settings), *refusals(checks)]
+    findings = [
+        *prepared.findings,
+        *(station_findings(stations) if stations else ()),
+        *_findings(judged, settings),
+        *refusals(checks),
+    ]
     slots = len(np.unique(prepared.events.slot[np.isin(prepared.events.kind, (PEER, POINT))]))
     last = max(vehicle.last_s for vehicle in prepared.vehicles)
     answer = CooperativeResult(
@@ -102,6 +109,7 @@ def estimate_session(
         duration_s=float(last - min(vehicle.first_s for vehicle in prepared.vehicles)),
         slots=slots,
         settings=_flat(asdict(settings)),
+        stations=stations,
         figures=(
             figures.tracks_figure([(one.run, one.judgements) for one in judged]),
             figures.geometry_figure(geometry, bound),

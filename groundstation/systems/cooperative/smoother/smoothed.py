@@ -21,8 +21,8 @@ from groundstation.systems.cooperative.loop_types import GATED, USED
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.smoother.chain import Chain, Problem, block
 from groundstation.systems.cooperative.smoother.forward import Doubts, doubt_blocks, first_pass
-from groundstation.systems.cooperative.smoother.knots import knots_of
-from groundstation.systems.cooperative.smoother.layout import layout_of
+from groundstation.systems.cooperative.smoother.knots import Knots, knots_of
+from groundstation.systems.cooperative.smoother.layout import Layout, layout_of
 from groundstation.systems.cooperative.smoother.rows import Linearised, Rows
 from groundstation.systems.cooperative.smoother.sight import OutputStates
 from groundstation.systems.cooperative.smoother.weights import Repetitions, cauchy, honest_factor, loss
@@ -102,6 +102,32 @@ def _relative(one: _Output, two: _Output, shared: FloatArray) -> tuple[FloatArra
     return time_s, own - both - both.swapaxes(1, 2)
 
 
+@dataclass(frozen=True)
+class SmoothedProblem:
+    """Answer of the smoother with the problem at it, for what can be asked of it besides.
+
+    Parameters
+    ----------
+    smoothed : SmoothedRun
+    problem : Problem
+        Linearised at the answer, with the weights that make honest covariances.
+    rows : Rows
+    layout : Layout
+    knots : Knots
+    """
+
+    smoothed: SmoothedRun
+    problem: Problem
+    rows: Rows
+    layout: Layout
+    knots: Knots
+
+
+def smooth_problem(prepared: Prepared, settings: CooperativeSettings) -> SmoothedProblem:
+    """Smooth a session, and keep the problem at the answer."""
+    return _Smoother(prepared, settings).with_problem()
+
+
 class _Smoother:
     def __init__(self, prepared: Prepared, settings: CooperativeSettings) -> None:
         self._prepared, self._settings = prepared, settings
@@ -129,6 +155,11 @@ class _Smoother:
             self._factor = factor
             x, seen, passes, has_settled = self._settle(x, seen, passes)
         return self._finish(x, seen, passes, has_settled)
+
+    def with_problem(self) -> SmoothedProblem:
+        """Run, and keep the problem at the answer."""
+        run = self.run(innovates=True)
+        return SmoothedProblem(run, self._problem_at_end, self._rows, self._layout, self._knots)
 
     def _still(self) -> FloatArray:
         """Return the states at all knots as the motion alone leads them."""
@@ -231,6 +262,7 @@ class _Smoother:
 
     def _finish(self, x: FloatArray, seen: Linearised, passes: int, has_settled: bool) -> SmoothedRun:
         layout, knots, prepared = self._layout, self._knots, self._prepared
+        self._problem_at_end = self._problem(x, seen, honest=True)
         blocks = [np.empty((len(x), layout.groups[g].size, layout.groups[g].size)) for g, _, _ in layout.of_vehicle]
         pairs = list(combinations(range(len(blocks)), 2)) if len(blocks) <= MOST_RELATIVE else []
         asked = {knot: number for number, knot in enumerate(np.unique(knots.output_knot).tolist())}
@@ -238,7 +270,7 @@ class _Smoother:
             (i, j): np.empty((len(asked), blocks[i].shape[1], blocks[j].shape[1])) for i, j in pairs
         }  # of two vehicles, at the knots of outputs
         points: list[SmoothedPoint] = []
-        for knot, P, _L, behind in Chain(self._problem(x, seen, honest=True)).covariances():
+        for knot, P, _L, behind in Chain(self._problem_at_end).covariances():
             for vehicle in range(len(blocks)):
                 blocks[vehicle][knot] = block(P, behind, layout.of(vehicle))
             for i, j in pairs if knot in asked else ():
