@@ -53,8 +53,8 @@ KINDS: Mapping[str, CriterionKind] = MappingProxyType(
 REVERSED = "read as its reverse: it says down in flight alone, and not on the wheels"
 EDITIONS = (
     "FSF: ALAR Briefing Notes 7.1 and 8.3, Flight Safety Digest, August to November 2000. GM2: EASA GM2 ORO.AOC.130, "
-    "ED Decision 2025/020/R; it lists events and leaves limits to operator and type. TC AC 525-008, issue 1 (2004), 3.0: "
-    "up to 10 kt no special tests. FAA Pilot/Controller Glossary: the first 3000 ft."
+    "ED Decision 2025/020/R; it lists events and leaves limits to operator and type. TC AC 525-008, issue 1 (2004), "
+    "3.0: up to 10 kt no special tests. FAA Pilot/Controller Glossary: the first 3000 ft."
 )
 
 
