@@ -320,7 +320,8 @@ def _place(seen: _Seen, touchdown: Touchdown) -> dict[str, _Value]:
 def _manner(seen: _Seen, touchdown: Touchdown) -> dict[str, _Value]:
     """Flap, pitch, bank, sink rate and load as the wheels meet the ground."""
     logged, at_s = seen.logged, touchdown.time_s
-    at = Place(at_s, 0.0, None if touchdown.past_threshold_m is None else -touchdown.past_threshold_m)
+    past = touchdown.past_threshold_m
+    at = Place(at_s, 0.0, None if past is None else seen.off.along_m - past)
     flap = logged.flap_deg[int(np.argmin(np.abs(seen.path.time_s - at_s)))]
     flap_value = float(flap) if np.isfinite(flap) and "flap" not in logged.tells else None
     flap_reason = logged.tells.get("flap", "") if np.isfinite(flap) else ""

@@ -10,6 +10,7 @@ from groundstation.systems.system import Study, System, Tab
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Adviser, Chapter
     from groundstation.plots.plot import Describe
+    from groundstation.systems.folder_standard import FolderStandard
     from groundstation.systems.study import StudyResult
 
 
@@ -68,6 +69,14 @@ def _study_along() -> "Callable[..., StudyResult]":
     return study_along
 
 
+def _folder_standards() -> "tuple[FolderStandard, ...]":
+    from groundstation.systems.folder_standard import FolderStandard
+    from groundstation.systems.landing.unstable import KIND, SHIPPED, judge
+    from groundstation.systems.landing.unstable_chapter import document
+
+    return (FolderStandard(KIND, SHIPPED, judge, document),)
+
+
 SYSTEM = System(
     name="landing",
     analyses=(LANDING, LANDING_BEACONS),
@@ -86,5 +95,6 @@ SYSTEM = System(
     plots=_plots,
     tabs=_tabs,
     advice=_advice,
+    folder_standards=_folder_standards,
     notebook_names={"landing_beacons.deviations": "landing-beacons"},
 )
