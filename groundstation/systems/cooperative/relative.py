@@ -15,7 +15,6 @@ from groundstation.systems.cooperative.expected_honesty import PairwiseCovarianc
 from groundstation.systems.cooperative.filters.steps import steps
 from groundstation.systems.cooperative.joint_covariance import joint_covariances, used_events
 from groundstation.systems.cooperative.settings import CooperativeSettings
-from groundstation.systems.cooperative.smoother.smoothed import smooth
 from groundstation.systems.cooperative.tracks import AlgorithmRun
 
 Relative = dict[tuple[int, int], tuple[FloatArray, FloatArray]]
@@ -40,7 +39,7 @@ def relative_covariances(prepared: Prepared, settings: CooperativeSettings, run:
     if run.algorithm == "dead_reckoning":
         return _independent(run)
     if run.algorithm == "smoothed":
-        return dict(smooth(prepared, settings).relative)
+        return dict(run.relative)
     instants = {"centralised": _centralised, "pairwise": _pairwise}.get(run.algorithm)
     found: dict[tuple[int, int], list[tuple[float, FloatArray]]] = {}
     for at_s, pairs in instants(prepared, settings, run) if instants else ():

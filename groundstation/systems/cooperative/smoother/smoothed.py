@@ -8,7 +8,6 @@ over the knots.
 Source: Barfoot, State Estimation for Robotics, 2nd ed. 2024, chapters 3 to 5 (batch, robust costs).
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -59,8 +58,6 @@ class SmoothedRun:
     ----------
     run : AlgorithmRun
     points : tuple of SmoothedPoint
-    relative : dict of (vehicle, vehicle) to (time_s (n,), covariance (n, 2, 2))
-        Covariance of the place of one vehicle to another, north and east; empty for more than ``MOST_RELATIVE``.
     passes : int
     has_settled : bool
         Whether the last step was small.
@@ -68,7 +65,6 @@ class SmoothedRun:
 
     run: AlgorithmRun
     points: tuple[SmoothedPoint, ...]
-    relative: Mapping[tuple[int, int], tuple[FloatArray, FloatArray]]
     passes: int
     has_settled: bool
 
@@ -95,7 +91,7 @@ _Output = tuple[FloatArray, Int64Array, OutputStates]  # times, knots among thos
 
 
 def _relative(one: _Output, two: _Output, shared: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return times that two vehicles have outputs at, and the covariance of their places to one another."""
+    """Return times of outputs of two vehicles, and the covariance of one to the other."""
     time_s, at, to = np.intersect1d(one[0], two[0], return_indices=True)
     both = one[2].by_knot[at, :2] @ shared[one[1][at]] @ two[2].by_knot[to, :2].swapaxes(1, 2)
     own = one[2].covariance[at, :2, :2] + two[2].covariance[to, :2, :2]
@@ -293,12 +289,13 @@ class _Smoother:
                 VehicleTrack(one_vehicle.name, time_s, out.position_m, out.state, out.covariance, one_vehicle.height)
             )
         judged, counts = self._judged(seen)
-        run = AlgorithmRun("smoothed", "batch", tuple(tracks), judged, counts, {}, np.zeros(0), np.zeros(0))
         signs = [1.0 if vehicle.heading >= 0 else -1.0 for vehicle in prepared.vehicles]  # a place, or its error
         relative = {
             (i, j): _relative(outputs[i], outputs[j], signs[i] * signs[j] * both) for (i, j), both in shared.items()
         }
-        return SmoothedRun(run, tuple(points), relative, passes, has_settled)
+        none = np.zeros(0)
+        run = AlgorithmRun("smoothed", "batch", tuple(tracks), judged, counts, {}, none, none, relative)
+        return SmoothedRun(run, tuple(points), passes, has_settled)
 
     def _judged(self, seen: Linearised) -> tuple[JudgedMeasurements, dict[str, int]]:
         """Return residuals over the spread of one reading; those beyond the gate count as gated."""

@@ -58,7 +58,10 @@ def honest_factor(scale: float) -> float:
 
 
 class Repetitions:
-    """Readings of the same links one after the other; of several antennas, each by its place among them."""
+    """Readings of the same links one after the other.
+
+    Where several antennas measure at one time, each follows by its place among them.
+    """
 
     def __init__(self, prepared: Prepared, rows: Rows) -> None:
         events, many = prepared.events, len(rows.event)
@@ -103,7 +106,7 @@ class Repetitions:
 
 
 def _as_white(share: float, since: FloatArray) -> FloatArray:
-    """Return how many white readings of the variance one reading is worth, inverted; see ``events``."""
+    """Return the factor of the variance that makes readings white ones; see ``events``."""
     return np.asarray(1.0 - share + share / np.tanh(since / 2.0))
 
 
