@@ -45,6 +45,8 @@ class AlgorithmRow:
         Traffic that a data link would carry for this algorithm, mean over slots.
     expected_nees : float or None
         NEES to expect from geometry and stated sigmas alone, worst time, where it was worked out (``pairwise``).
+    two_sigma_r_session_m : float or None
+        Twice the root mean square of the computed sigma_r over the whole session, worst vehicle.
     refused : str
         Why this algorithm was not run; empty where it was. All figures of a refused one are None or 0.
     """
@@ -66,6 +68,7 @@ class AlgorithmRow:
     messages: int
     bytes_per_slot: float
     expected_nees: float | None = None
+    two_sigma_r_session_m: float | None = None
     refused: str = ""
 
 

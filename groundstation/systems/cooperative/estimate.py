@@ -142,6 +142,7 @@ def _judged(prepared: Prepared, run: AlgorithmRun, truth: Truth) -> JudgedRun:
 def _algorithm_row(prepared: Prepared, one: JudgedRun, bound: AlgorithmRun, slots: int) -> AlgorithmRow:
     run = one.run
     ends = [float(track.two_sigma_r_m[-1]) for track in run.tracks if len(track.time_s)]
+    whole = [_mean_square_root(track.two_sigma_r_m.tolist()) for track in run.tracks if len(track.time_s)]
     messages = sum(count for count, _ in run.messages.values())
     total = sum(size for _, size in run.messages.values())
     nees = low = high = ratio = rms = None
@@ -170,6 +171,7 @@ def _algorithm_row(prepared: Prepared, one: JudgedRun, bound: AlgorithmRun, slot
         lost=run.counts.get("lost", 0),
         messages=messages,
         bytes_per_slot=total / slots if slots else 0.0,
+        two_sigma_r_session_m=max(whole, default=None),
     )
 
 
@@ -267,6 +269,9 @@ def _findings(judged: Sequence[JudgedRun], settings: CooperativeSettings) -> lis
         if counts.get("clock_leaps", 0):
             text = f"{name}: a clock leap of a vehicle was assumed {counts['clock_leaps']} times"
             found.append(Finding("warn", "cooperative.clock_reset", text, count=counts["clock_leaps"]))
+        if counts.get("unsettled", 0):
+            text = f"{name}: the last of {settings.smoother.most_passes} passes still moved the answer"
+            found.append(Finding("warn", "cooperative.not_settled", text))
         if counts.get("reopened", 0):
             count = counts["reopened"]
             text = f"{name}: a vehicle was not where it was estimated {count} times; its position was searched again"

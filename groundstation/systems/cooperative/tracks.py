@@ -98,7 +98,7 @@ class AlgorithmRun:
         In the order of the vehicles.
     judged : JudgedMeasurements
     counts : dict
-        ``used``, ``gated``, ``lost``, ``unused``, ``clock_leaps``, ``reopened``.
+        ``used``, ``gated``, ``lost``, ``unused``, ``clock_leaps``, ``reopened``, ``unsettled``.
     messages : dict of vehicle to (messages, bytes)
     map_time_s, map_radius : ndarrays, shape (w,)
         Spectral radius of the joint error map over each window; empty for a centralised filter.

@@ -10,7 +10,6 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.base.records import BoolArray, Int64Array
-from groundstation.base.units import LIGHT_MPS
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.filters.observation import LIGHT_MPS, NEAREST_M
 from groundstation.systems.cooperative.loop_types import HEIGHT, PEER, POINT, SATELLITE, Events
@@ -19,7 +18,6 @@ from groundstation.systems.cooperative.smoother.layout import Layout, pair_of
 from groundstation.systems.cooperative.smoother.sight import Ends, RangeErrors
 
 AT_ONCE = 20_000  # readings linearised together
-NEAREST_M = 1e-3  # a source on top of the receiver has no direction
 
 
 @dataclass(frozen=True, slots=True)

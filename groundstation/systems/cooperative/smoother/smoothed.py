@@ -289,6 +289,8 @@ class _Smoother:
                 VehicleTrack(one_vehicle.name, time_s, out.position_m, out.state, out.covariance, one_vehicle.height)
             )
         judged, counts = self._judged(seen)
+        if not has_settled:
+            counts["unsettled"] = 1
         signs = [1.0 if vehicle.heading >= 0 else -1.0 for vehicle in prepared.vehicles]  # a place, or its error
         relative = {
             (i, j): _relative(outputs[i], outputs[j], signs[i] * signs[j] * both) for (i, j), both in shared.items()
