@@ -53,7 +53,7 @@ class Datum:
     east_deg: float = 180.0
 
     def is_used_at(self, latitude_deg: float, longitude_deg: float) -> bool:
-        """Tell whether the datum is in use there; one that crosses the date line has its east below its west."""
+        """Tell whether the datum is in use there; across the date line east is below west."""
         between = self.west_deg <= longitude_deg <= self.east_deg
         if self.east_deg < self.west_deg:
             between = longitude_deg >= self.west_deg or longitude_deg <= self.east_deg
@@ -72,7 +72,7 @@ class Datum:
         return np.asarray(self.shift_m) + (1.0 + 1e-6 * self.scale_ppm) * turned
 
     def error_m(self, latitude_deg: float, longitude_deg: float) -> FloatArray:
-        """Return believed less true place, north and east, of coordinates in this datum taken for WGS-84.
+        """Return believed less true place (north, east) of coordinates taken for WGS-84.
 
         Examples
         --------

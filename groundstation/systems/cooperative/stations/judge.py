@@ -1,4 +1,4 @@
-"""Judge the ground stations of a session, and prepare a session that does not rely on those in doubt.
+"""Judgement on the ground stations, and a session that does not rely on those in doubt.
 
 Round by round the stations not yet in doubt are tested. Where a test refuses, every station that explains the residuals
 about as well as the best is in doubt: two stations that contradict each other do not say which of them is wrong. A
@@ -40,7 +40,7 @@ DATUM_DECIDABLE = 20.0  # noncentrality: the datum's errors would be told in 95 
 
 @dataclass(frozen=True)
 class Doubt:
-    """A station in doubt, with its hypotheses, the best first; ``left_out`` where no shift explains its ranges."""
+    """Station in doubt, with its hypotheses; ``left_out`` where no shift explains its ranges."""
 
     station: int
     tests: tuple[StationTest, ...]
@@ -109,7 +109,7 @@ class StationJudgement:
         return tuple(doubt.station for doubt in self.doubts if rounds.count(doubt.round) == 1)
 
     def detectable_m(self, station: int) -> tuple[float, float]:
-        """Return the smallest shift that is found with 95 %, in the best and in the worst direction; inf: none is."""
+        """Return the smallest shift found with 95 %, best and worst direction; inf: none is."""
         part = slice(EACH * station, EACH * station + 2)
         information = np.linalg.eigvalsh(self.asked.matrix[part, part])
         need = noncentrality(2 * len(self.asked.names))
@@ -119,13 +119,13 @@ class StationJudgement:
         return best, worst
 
     def metres_per_metre(self, station: int) -> tuple[float, int]:
-        """Return by how much a metre of the station moves the answer in the worst direction, and whose."""
+        """Return by how much a metre of the station moves the answer at worst, and whose."""
         moved = self.asked.answer[..., EACH * station : EACH * station + 2]
         each = np.linalg.svd(moved, compute_uv=False)[..., 0].max(axis=0)
         return float(each.max()), int(each.argmax())
 
     def protection_m(self, vehicle: int) -> tuple[float, float]:
-        """Return what bounds a vehicle's error while one station is off unseen, at its worst time and at the end.
+        """Return the bound of a vehicle's error with a station off unseen: at worst, at the end.
 
         It is the largest effect of a shift that the test finds with 95 % and no more, and 1.96 sigma of the answer in
         its worst direction beside it.
@@ -167,7 +167,7 @@ def judge_stations(session: Session, settings: CooperativeSettings) -> StationJu
 
 
 def _believable(session: Session, settings: CooperativeSettings) -> tuple[CooperativeSettings, Solved]:
-    """Return settings with sigmas of INS and clocks as large as the session shows them, the stations being free."""
+    """Return settings with sigmas of INS and clocks as large as the session shows them."""
     solved = station_information(session, settings)
     for _ in range(BELIEF_ROUNDS):
         information, smoothed, prepared = solved
@@ -203,7 +203,7 @@ def _without(session: Session, doubts: Sequence[Doubt]) -> Session:
 def datum_tests(
     session: Session, information: StationInformation, tests: Sequence[StationTest]
 ) -> tuple[DatumTest, ...]:
-    """Test datums in use where the stations are; none in a session whose places on the globe are not known."""
+    """Test datums in use where the stations are; none where their places are not known."""
     places = [_place_deg(session, point) for point in session.points]
     if not places or any(place is None for place in places):
         return ()
@@ -239,7 +239,7 @@ def _place_deg(session: Session, point: GroundPoint) -> tuple[float, float] | No
 
 
 def survey_of(judgement: StationJudgement, station: int) -> tuple[FloatArray, FloatArray] | None:
-    """Return where a station surveyed itself, true less believed place (north, east), and its sigmas."""
+    """Return the place that a station surveyed, less that of the file, and its sigmas."""
     for one in judgement.surveyed:
         if one.point == station:
             return -one.error_m, np.sqrt(np.diag(one.covariance_m2))
