@@ -92,7 +92,8 @@ def test_a_station_500_m_off_is_found_and_named_where_a_third_one_tells() -> Non
     _, judgement, wrong = judged("three-500")
     assert judgement.named() == tuple(wrong) == (1,)
     (doubt,) = judgement.doubts
-    (shift,) = (test for test in doubt.tests if test.kind == "shift")
+    shift = doubt.place
+    assert shift is not None
     miss = shift.error_m - wrong[1]
     assert miss @ np.linalg.solve(shift.covariance_m2, miss) < 13.8  # one in a thousand
     survey = survey_of(judgement, 1)

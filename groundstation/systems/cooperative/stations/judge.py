@@ -34,18 +34,32 @@ from groundstation.tables.session import GroundPoint, Session
 
 MOST_ROUNDS, BELIEF_ROUNDS = 4, 2
 Solved = tuple[StationInformation, SmoothedProblem, Prepared]
+FREE = 5.0  # sigmas of a free place, in sizes of the error found
 DATUM_TOLD = 12.0  # twice the log of the likelihood ratio of a datum from which it is told
 DATUM_DECIDABLE = 20.0  # noncentrality: the datum's errors would be told in 95 % of sessions
 
 
 @dataclass(frozen=True)
 class Doubt:
-    """Station in doubt, with its hypotheses; ``left_out`` where no shift explains its ranges."""
+    """Station in doubt, with its hypotheses; ``left_out`` where no shift explains its ranges.
+
+    Parameters
+    ----------
+    station : int
+    tests : tuple of StationTest
+        The best first.
+    left_out : bool
+    round : int
+    place : StationTest, optional
+        The shift, from a session in which this station alone is free: a test is linear about an answer that leans on
+        the wrong place.
+    """
 
     station: int
     tests: tuple[StationTest, ...]
     left_out: bool
     round: int
+    place: StationTest | None = None
 
 
 @dataclass(frozen=True)
@@ -153,7 +167,7 @@ def judge_stations(session: Session, settings: CooperativeSettings) -> StationJu
     for number in range(MOST_ROUNDS):
         if not alarms(found):
             break
-        fresh = _doubts(found, number)
+        fresh = [_placed(doubt, now, raised) for doubt in _doubts(found, number)]
         doubts += fresh
         now = _without(now, fresh)
         information, solved, _ = station_information(now, raised)
@@ -187,6 +201,23 @@ def _doubts(found: Sequence[StationTest], number: int) -> list[Doubt]:
     return doubts
 
 
+def _placed(doubt: Doubt, session: Session, settings: CooperativeSettings) -> Doubt:
+    """Return the doubt with the place that the session gives the station when it alone is free."""
+    if doubt.left_out:
+        return doubt
+    shift = next(test for test in doubt.tests if test.kind == SHIFT)
+    points = list(session.points)
+    points[doubt.station] = _freed(points[doubt.station], FREE * shift.largest_m)
+    information, solved, _ = station_information(replace(session, points=tuple(points)), settings)
+    (point,) = (one for one in solved.smoothed.points if one.point == doubt.station)
+    covariance = information.repetition * point.covariance_m2
+    return replace(doubt, place=replace(shift, error_m=point.error_m, covariance_m2=covariance))
+
+
+def _freed(point: GroundPoint, sigma_m: float) -> GroundPoint:
+    return replace(point, position_sigma_m=float(np.hypot(point.position_sigma_m, sigma_m)))
+
+
 def _without(session: Session, doubts: Sequence[Doubt]) -> Session:
     """Return the session with stations in doubt free to move, or left out."""
     points, ranges = list(session.points), session.ranges
@@ -195,8 +226,7 @@ def _without(session: Session, doubts: Sequence[Doubt]) -> Session:
         if doubt.left_out:
             ranges = ranges.take(ranges.source != point.name)
             continue
-        largest = max(test.largest_m for test in doubt.tests if test.kind == SHIFT)
-        points[doubt.station] = replace(point, position_sigma_m=float(np.hypot(point.position_sigma_m, largest)))
+        points[doubt.station] = _freed(point, doubt.place.largest_m if doubt.place else 0.0)
     return replace(session, points=tuple(points), ranges=ranges)
 
 

@@ -115,7 +115,7 @@ def _finding(row: StationRow, text: str) -> Finding:
 def _row(judgement: StationJudgement, session: Session, station: int, vehicles: Sequence[str]) -> StationRow:
     doubt = next((one for one in judgement.doubts if one.station == station), None)
     tests = {test.kind: test for test in (*judgement.tests, *(doubt.tests if doubt else ())) if test.station == station}
-    shift = tests.get(SHIFT)
+    shift = doubt.place if doubt is not None and doubt.place is not None else tests.get(SHIFT)
     delay = next((test for kind, test in tests.items() if kind != SHIFT), None)
     best, worst = judgement.detectable_m(station)
     moves, whose = judgement.metres_per_metre(station)

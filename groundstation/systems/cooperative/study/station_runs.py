@@ -18,7 +18,6 @@ from groundstation.systems.cooperative.loop_types import POINT
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.smoother.smoothed import run_smoothed
 from groundstation.systems.cooperative.stations.datums import DATUMS
-from groundstation.systems.cooperative.stations.hypotheses import SHIFT
 from groundstation.systems.cooperative.stations.judge import StationJudgement, judge_stations
 from groundstation.systems.cooperative.study.runs import WORKERS, Progress
 from groundstation.systems.cooperative.study.station_cases import StationCase
@@ -184,7 +183,7 @@ def _errors(
 
 def _inside(judgement: StationJudgement, wrong: dict[int, FloatArray]) -> float:
     """Tell whether the true shift of the wrong station lies inside its 95 % ellipse."""
-    tests = [test for doubt in judgement.doubts for test in doubt.tests if test.kind == SHIFT and test.station in wrong]
+    tests = [doubt.place for doubt in judgement.doubts if doubt.place is not None and doubt.station in wrong]
     if len(wrong) != 1 or len(tests) != 1 or not wrong[tests[0].station].any():
         return float("nan")
     miss = tests[0].error_m - wrong[tests[0].station]
