@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from groundstation.base.datums import DATUMS
+from groundstation.base.errors import SettingsError
 from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_scenario import load_session
 from groundstation.systems.cooperative.estimate import estimate_session
 from groundstation.systems.cooperative.events import prepare
 from groundstation.systems.cooperative.smoother.smoothed import run_smoothed
-from groundstation.systems.cooperative.stations.datums import DATUMS
 from groundstation.systems.cooperative.stations.hypotheses import FOUND, chance_of, noncentrality
 from groundstation.systems.cooperative.stations.information import EACH, station_information
 from groundstation.systems.cooperative.stations.judge import StationJudgement, judge_stations, survey_of
@@ -18,6 +19,8 @@ from groundstation.systems.cooperative.study.station_cases import CASES, Station
 from groundstation.systems.cooperative.study.station_runs import drawn
 from groundstation.systems.cooperative.study.stations import study_stations
 from groundstation.tables.session import Session
+from groundstation.tables.session_assemble import session_from_flights
+from groundstation.tables.session_settings import Station, Stations
 
 BY_NAME = {case.name: case for case in CASES}
 SEED = 4711
@@ -69,6 +72,16 @@ def test_datums_are_those_of_proj() -> None:
         assert datum.error_m(55.75, 37.6) == pytest.approx(OF_PROJ[datum.name], abs=0.06)  # a plane, and height 0
     assert DATUMS[0].is_used_at(56.0, 38.0) and DATUMS[0].is_used_at(66.0, -170.0)
     assert not DATUMS[0].is_used_at(40.0, -75.0)
+
+
+def test_a_stations_file_in_another_datum_is_taken_to_wgs_84() -> None:
+    """The latitude and longitude of PROJ for 55.75 N, 37.6 E in SK-42 (EPSG operation 5044)."""
+    one = Station("N1", 55.75, 37.6, 100.0)
+    session = session_from_flights((), Stations((one,), datum="SK-42")).session
+    assert session.points[0].place_deg == pytest.approx((55.75004226860743, 37.598125509681964), abs=1e-9)
+    assert session_from_flights((), Stations((one,))).session.points[0].place_deg == (55.75, 37.6)
+    with pytest.raises(SettingsError, match="SK-42, SK-95"):
+        Stations((one,), datum="SK42")
 
 
 def test_the_smallest_detectable_error_is_found_as_often_as_it_says() -> None:

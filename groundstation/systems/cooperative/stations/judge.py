@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.datums import DATUMS
 from groundstation.base.ecef import geodetic_deg_m
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.smoother.smoothed import SmoothedPoint, SmoothedProblem
 from groundstation.systems.cooperative.stations.belief import belief_factors, raised_sigmas, with_factors
-from groundstation.systems.cooperative.stations.datums import DATUMS
 from groundstation.systems.cooperative.stations.hypotheses import (
     CANNOT_TELL,
     SHIFT,

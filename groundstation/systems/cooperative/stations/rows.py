@@ -59,7 +59,10 @@ def station_findings(answer: StationsAnswer) -> tuple[Finding, ...]:
     found = []
     told = [row.datum for row in answer.datums if row.is_told]
     if told:
-        text = f"stations look to be in {' or '.join(told)}: state them in WGS-84; " + _unknown(answer.rows)
+        text = (
+            f"stations look to be in {' or '.join(told)}: write datum = {told[0]!r} on top of the stations file; "
+            + _unknown(answer.rows)
+        )
         found.append(Finding("warn", "cooperative.station_datum", text))
     for row in answer.with_verdict("off"):
         text = f"station {row.station} is not where the stations file has it: {shift_text(row)}; {_unknown((row,))}"

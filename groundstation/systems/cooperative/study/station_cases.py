@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from groundstation.base.datums import DATUMS
 from groundstation.simulation.session_scenario import (
     SessionErrorSigmas,
     SessionPoint,
@@ -17,7 +18,6 @@ from groundstation.simulation.session_scenario import (
     load_session,
 )
 from groundstation.systems.cooperative.settings import CooperativeSettings, InsBelief
-from groundstation.systems.cooperative.stations.datums import DATUMS
 
 FIRST_SEED = 90_000
 THIRD = SessionPoint("N3", 20_000.0, 90_000.0)

@@ -9,6 +9,7 @@ from multiprocessing import get_context
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.datums import DATUMS
 from groundstation.base.geodesy import curvature_radii_m
 from groundstation.simulation.session import SimulatedSession, simulate_session
 from groundstation.systems.cooperative.algorithms import run_algorithm
@@ -17,7 +18,6 @@ from groundstation.systems.cooperative.events import prepare
 from groundstation.systems.cooperative.loop_types import POINT
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.smoother.smoothed import run_smoothed
-from groundstation.systems.cooperative.stations.datums import DATUMS
 from groundstation.systems.cooperative.stations.judge import StationJudgement, judge_stations
 from groundstation.systems.cooperative.study.runs import WORKERS, Progress
 from groundstation.systems.cooperative.study.station_cases import StationCase

@@ -1,4 +1,4 @@
-"""Geodetic datums that a stations file may be in by mistake, against WGS-84.
+"""Geodetic datums other than WGS-84 that places on the ground are stated in.
 
 Each is the transformation that its authority publishes, as the EPSG dataset has it. Differences of a metre and less
 (PZ-90.11, GSK-2011) cannot be seen by ranges over a link and are not among them.
@@ -129,3 +129,4 @@ DATUMS = (
         east_deg=154.0,
     ),
 )
+BY_NAME = {datum.name: datum for datum in DATUMS}
