@@ -59,7 +59,7 @@ class StationRow:
 
 @dataclass(frozen=True)
 class ProtectionRow:
-    """Bound of an aircraft's error (smoothed) while one station is off by what the test just finds.
+    """Bound of an aircraft's smoothed error while a station is off by what the test finds.
 
     ``worst_m`` over the session, ``end_m`` at its end.
     """

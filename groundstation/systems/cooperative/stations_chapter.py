@@ -1,6 +1,6 @@
-"""Part of the session's chapter on its ground stations: who is in doubt, and what an error unseen would do."""
+"""Part of the session's chapter on its ground stations."""
 
-from groundstation.chapters.parts import Grid, Head, Mark, Note, Part
+from groundstation.chapters.parts import Grid, Head, Mark, Note, Part, Tone
 from groundstation.chapters.wording import named_quantity, number
 from groundstation.systems.cooperative.answer import CooperativeResult
 from groundstation.systems.cooperative.stations_answer import StationRow, StationsAnswer
@@ -8,15 +8,21 @@ from groundstation.systems.cooperative.stations_answer import StationRow, Statio
 STATION_HEADS = (
     *(Head("Station"), Head("Judged"), Head("Ranges", True), Head("Chance if right", True)),
     *(Head("Shift if it is off, m", True), Head("Towards, deg", True), Head("Delay if that is off, m", True)),
-    *(Head("Detectable shift, m", True), Head("Answer's metres per metre", True)),
-    *(Head("Sigma stated, m", True), Head("Sigma used, m", True), Head("Surveyed north, east, m", True)),
+    *(Head("Sigma stated, m", True), Head("Sigma used, m", True)),
 )
 STATION_CAPTION = (
     "Shift: from the place in the stations file to where the ranges put the station if it alone is off, one sigma "
-    "behind it. Delay: by how much its ranges are too long if that alone is wrong. Detectable: the smallest shift that "
-    "is found with 95 %, best to worst direction. Metres per metre: what a metre of shift moves the smoothed answer, "
-    "worst direction, aircraft and time. Surveyed: where the answer puts a station whose place is not taken as exact, "
-    "off the file, with sigmas."
+    "behind it. Delay: by how much its ranges are too long if that alone is wrong. Sigma: of its place, as the file "
+    "states it and as the answer takes it."
+)
+RELIABILITY_HEADS = (
+    *(Head("Station"), Head("Detectable shift, m", True), Head("Answer's metres per metre", True), Head("Most of")),
+    Head("Surveyed north, east, m", True),
+)
+RELIABILITY_CAPTION = (
+    "Detectable: the smallest shift that is found with 95 %, best to worst direction. Metres per metre: by how much a "
+    "metre of shift moves the smoothed answer, worst direction, aircraft and time. Surveyed: where the answer puts a "
+    "station whose place is not taken as exact, off the file, with sigmas."
 )
 PROTECTION_HEADS = (Head("Aircraft"), Head("Worst, m", True), Head("At the end, m", True))
 PROTECTION_CAPTION = (
@@ -31,7 +37,7 @@ DATUM_CAPTION = (
     "Evidence: twice the log of the likelihood ratio against WGS-84; above 12 the datum is told. Could be told: the "
     "session would show it."
 )
-TONES = {"fits": "good", "off": "bad", "one of several": "warn", "left out": "bad"}
+TONES: dict[str, Tone] = {"fits": "good", "off": "bad", "one of several": "warn", "left out": "bad"}
 
 
 def stations_warning(answer: CooperativeResult) -> str:
@@ -76,7 +82,7 @@ def stations_parts(answer: CooperativeResult) -> tuple[Part | None, ...]:
             "with these.",
             "warn",
         )
-    return (_stations(stations), note, _protection(stations), _datums(stations))
+    return (_stations(stations), note, _reliability(stations), _protection(stations), _datums(stations))
 
 
 def _size(row: StationRow) -> str:
@@ -95,15 +101,20 @@ def _stations(stations: StationsAnswer) -> Grid:
             _with_sigma(row.shift_m, row.shift_sigma_m),
             number(row.shift_direction_deg, 0),
             _with_sigma(row.delay_m, row.delay_sigma_m, signed=True),
-            _best_to_worst(row),
-            number(row.metres_per_metre, 2),
             number(row.stated_sigma_m, 1),
             "not used" if row.verdict == "left out" else number(row.used_sigma_m, 1),
-            _surveyed(row),
         )
         for row in stations.rows
     ]
     return Grid("Ground stations", STATION_HEADS, rows, STATION_CAPTION)
+
+
+def _reliability(stations: StationsAnswer) -> Grid:
+    rows = [
+        (row.station, _best_to_worst(row), number(row.metres_per_metre, 2), row.moves_most, _surveyed(row))
+        for row in stations.rows
+    ]
+    return Grid("Errors of stations that stay unseen", RELIABILITY_HEADS, rows, RELIABILITY_CAPTION)
 
 
 def _with_sigma(value: float | None, sigma: float | None, *, signed: bool = False) -> str:

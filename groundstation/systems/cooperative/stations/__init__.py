@@ -1,1 +1,1 @@
-"""Ground stations judged: their places, clocks and datum, and what an error of theirs does to the answer."""
+"""Ground stations judged: their places, clocks and datum, and the weight of their errors."""

@@ -1,4 +1,4 @@
-"""Sigmas believed of INS and clocks, held against what start and motion had to give in the session.
+"""Sigmas believed of INS and clocks, held against what the session shows.
 
 The stations are tested against these sigmas: where INS or clocks are worse than believed, a right station would be
 refused. The duals of the smoother tell: those of one component, squared and over their expected square, estimate the
@@ -26,7 +26,7 @@ LEAST_FREEDOM = 0.5  # independent numbers, below which a component tells nothin
 def belief_factors(
     prepared: Prepared, solved: SmoothedProblem, information: StationInformation
 ) -> dict[str, tuple[float, float]]:
-    """Return the factor of each believed variance of INS and clocks, with the independent numbers it rests on."""
+    """Return the factor of each believed variance, with the independent numbers behind it."""
     found: dict[str, list[float]] = {}
     response = information.response
     numbers, _, _, _ = np.linalg.lstsq(information.matrix, information.score, rcond=1e-9)
@@ -77,7 +77,7 @@ def raised_sigmas(before: InsBelief, after: InsBelief) -> dict[str, float]:
 
 
 def _components(vehicle: Aircraft) -> Iterator[tuple[str, Int64Array, bool]]:
-    """Yield the fields of the belief with the states that they are of, at the start or in motion."""
+    """Yield the fields of the belief with their states, at the start or in motion."""
     height, clock = vehicle.height, vehicle.clock
     yield "position_m", np.array([0, 1]), True
     yield "velocity_mps", np.array([2, 3]), True

@@ -86,14 +86,14 @@ def chance_of(statistic: float, freedom: int) -> float:
 
 
 def station_tests(information: StationInformation, asked: Sequence[int]) -> tuple[StationTest, ...]:
-    """Test the stations asked for, each for a shift and for a delay; what cannot be seen at all is left out."""
+    """Test stations for a shift and for a delay; what cannot be seen at all is left out."""
     found = []
     for station in asked:
         for kind, axes in AXES.items():
             part = slice(EACH * station + axes.start, EACH * station + axes.stop)
             C, y = information.matrix[part, part], information.score[part]
             if float(np.linalg.eigvalsh(C)[0]) > UNSEEN:
-                covariance = np.linalg.inv(C)
+                covariance = np.asarray(np.linalg.inv(C), dtype=np.float64)
                 found.append(StationTest(station, kind, float(y @ covariance @ y), covariance @ y, covariance))
     return tuple(found)
 
@@ -104,7 +104,7 @@ def alarms(tests: Sequence[StationTest], level: float = FALSE_ALARMS) -> bool:
 
 
 def open_hypotheses(tests: Sequence[StationTest]) -> tuple[StationTest, ...]:
-    """Return the hypotheses that explain the residuals about as well as the best, the best first."""
+    """Return the hypotheses about as good as the best, the best first."""
     ordered = sorted(tests, key=lambda test: -test.statistic)
     return tuple(test for test in ordered if ordered[0].statistic - test.statistic < CANNOT_TELL)
 

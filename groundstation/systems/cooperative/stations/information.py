@@ -1,4 +1,4 @@
-"""Information of a session about errors of its ground stations, and the answer's share of such an error.
+"""Information of a session about errors of its ground stations, and what they do to it.
 
 A station that stands elsewhere than believed, or whose ranges are too long by a delay, adds known columns times unknown
 numbers to the residuals of the smoother's problem. All else stays unknown in it: with the states eliminated the numbers
@@ -70,7 +70,7 @@ class StationInformation:
 def station_information(
     session: Session, settings: CooperativeSettings
 ) -> tuple[StationInformation, SmoothedProblem, Prepared]:
-    """Smooth a session and return what it tells of its stations, as the stations file has them."""
+    """Smooth a session and return what it tells of its stations."""
     known = tuple(
         point if point.position_sigma_m > 0.0 else replace(point, position_sigma_m=SURVEYED_M)
         for point in session.points
@@ -119,7 +119,7 @@ def information_of(prepared: Prepared, solved: SmoothedProblem, settings: Cooper
 
 
 def repetition(normal: FloatArray, link: Int64Array, time_s: FloatArray, scale: float) -> float:
-    """Return the factor by which residuals over their sigmas tell less than as many independent ones.
+    """Return the factor by which residuals tell less than as many independent ones.
 
     It is the long-run variance of the residuals of a link over that of right, independent readings under the robust
     weights, from the autocorrelations of all links together. Their sum ends at the first pair of lags whose sum is not
@@ -155,7 +155,7 @@ def repetition(normal: FloatArray, link: Int64Array, time_s: FloatArray, scale: 
 
 
 def honest_square(scale: float) -> float:
-    """Return the mean square that independent residuals of the right sigma have under the robust weights.
+    """Return the mean square of right, independent residuals under the robust weights.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Judge the ground stations of a session, and prepare a session that does not rely on those in doubt.
+"""Judgement on the ground stations, and a session that does not rely on those in doubt.
 
 Round by round the stations not yet in doubt are tested. Where a test refuses, every station that explains the residuals
 about as well as the best is in doubt: two stations that contradict each other do not say which of them is wrong. A
@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.datums import DATUMS
 from groundstation.base.ecef import geodetic_deg_m
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.smoother.smoothed import SmoothedPoint, SmoothedProblem
 from groundstation.systems.cooperative.stations.belief import belief_factors, raised_sigmas, with_factors
-from groundstation.systems.cooperative.stations.datums import DATUMS
 from groundstation.systems.cooperative.stations.hypotheses import (
     CANNOT_TELL,
     SHIFT,
@@ -34,18 +34,32 @@ from groundstation.tables.session import GroundPoint, Session
 
 MOST_ROUNDS, BELIEF_ROUNDS = 4, 2
 Solved = tuple[StationInformation, SmoothedProblem, Prepared]
+FREE = 5.0  # sigmas of a free place, in sizes of the error found
 DATUM_TOLD = 12.0  # twice the log of the likelihood ratio of a datum from which it is told
 DATUM_DECIDABLE = 20.0  # noncentrality: the datum's errors would be told in 95 % of sessions
 
 
 @dataclass(frozen=True)
 class Doubt:
-    """A station in doubt, with its hypotheses, the best first; ``left_out`` where no shift explains its ranges."""
+    """Station in doubt, with its hypotheses; ``left_out`` where no shift explains its ranges.
+
+    Parameters
+    ----------
+    station : int
+    tests : tuple of StationTest
+        The best first.
+    left_out : bool
+    round : int
+    place : StationTest, optional
+        The shift, from a session in which this station alone is free: a test is linear about an answer that leans on
+        the wrong place.
+    """
 
     station: int
     tests: tuple[StationTest, ...]
     left_out: bool
     round: int
+    place: StationTest | None = None
 
 
 @dataclass(frozen=True)
@@ -109,7 +123,7 @@ class StationJudgement:
         return tuple(doubt.station for doubt in self.doubts if rounds.count(doubt.round) == 1)
 
     def detectable_m(self, station: int) -> tuple[float, float]:
-        """Return the smallest shift that is found with 95 %, in the best and in the worst direction; inf: none is."""
+        """Return the smallest shift found with 95 %, best and worst direction; inf: none is."""
         part = slice(EACH * station, EACH * station + 2)
         information = np.linalg.eigvalsh(self.asked.matrix[part, part])
         need = noncentrality(2 * len(self.asked.names))
@@ -119,13 +133,13 @@ class StationJudgement:
         return best, worst
 
     def metres_per_metre(self, station: int) -> tuple[float, int]:
-        """Return by how much a metre of the station moves the answer in the worst direction, and whose."""
+        """Return by how much a metre of the station moves the answer at worst, and whose."""
         moved = self.asked.answer[..., EACH * station : EACH * station + 2]
         each = np.linalg.svd(moved, compute_uv=False)[..., 0].max(axis=0)
         return float(each.max()), int(each.argmax())
 
     def protection_m(self, vehicle: int) -> tuple[float, float]:
-        """Return what bounds a vehicle's error while one station is off unseen, at its worst time and at the end.
+        """Return the bound of a vehicle's error with a station off unseen: at worst, at the end.
 
         It is the largest effect of a shift that the test finds with 95 % and no more, and 1.96 sigma of the answer in
         its worst direction beside it.
@@ -153,7 +167,7 @@ def judge_stations(session: Session, settings: CooperativeSettings) -> StationJu
     for number in range(MOST_ROUNDS):
         if not alarms(found):
             break
-        fresh = _doubts(found, number)
+        fresh = [_placed(doubt, now, raised) for doubt in _doubts(found, number)]
         doubts += fresh
         now = _without(now, fresh)
         information, solved, _ = station_information(now, raised)
@@ -167,7 +181,7 @@ def judge_stations(session: Session, settings: CooperativeSettings) -> StationJu
 
 
 def _believable(session: Session, settings: CooperativeSettings) -> tuple[CooperativeSettings, Solved]:
-    """Return settings with sigmas of INS and clocks as large as the session shows them, the stations being free."""
+    """Return settings with sigmas of INS and clocks as large as the session shows them."""
     solved = station_information(session, settings)
     for _ in range(BELIEF_ROUNDS):
         information, smoothed, prepared = solved
@@ -187,6 +201,23 @@ def _doubts(found: Sequence[StationTest], number: int) -> list[Doubt]:
     return doubts
 
 
+def _placed(doubt: Doubt, session: Session, settings: CooperativeSettings) -> Doubt:
+    """Return the doubt with the place that the session gives the station when it alone is free."""
+    if doubt.left_out:
+        return doubt
+    shift = next(test for test in doubt.tests if test.kind == SHIFT)
+    points = list(session.points)
+    points[doubt.station] = _freed(points[doubt.station], FREE * shift.largest_m)
+    information, solved, _ = station_information(replace(session, points=tuple(points)), settings)
+    (point,) = (one for one in solved.smoothed.points if one.point == doubt.station)
+    covariance = information.repetition * point.covariance_m2
+    return replace(doubt, place=replace(shift, error_m=point.error_m, covariance_m2=covariance))
+
+
+def _freed(point: GroundPoint, sigma_m: float) -> GroundPoint:
+    return replace(point, position_sigma_m=float(np.hypot(point.position_sigma_m, sigma_m)))
+
+
 def _without(session: Session, doubts: Sequence[Doubt]) -> Session:
     """Return the session with stations in doubt free to move, or left out."""
     points, ranges = list(session.points), session.ranges
@@ -195,15 +226,14 @@ def _without(session: Session, doubts: Sequence[Doubt]) -> Session:
         if doubt.left_out:
             ranges = ranges.take(ranges.source != point.name)
             continue
-        largest = max(test.largest_m for test in doubt.tests if test.kind == SHIFT)
-        points[doubt.station] = replace(point, position_sigma_m=float(np.hypot(point.position_sigma_m, largest)))
+        points[doubt.station] = _freed(point, doubt.place.largest_m if doubt.place else 0.0)
     return replace(session, points=tuple(points), ranges=ranges)
 
 
 def datum_tests(
     session: Session, information: StationInformation, tests: Sequence[StationTest]
 ) -> tuple[DatumTest, ...]:
-    """Test datums in use where the stations are; none in a session whose places on the globe are not known."""
+    """Test datums in use where the stations are; none where their places are not known."""
     places = [_place_deg(session, point) for point in session.points]
     if not places or any(place is None for place in places):
         return ()
@@ -239,7 +269,7 @@ def _place_deg(session: Session, point: GroundPoint) -> tuple[float, float] | No
 
 
 def survey_of(judgement: StationJudgement, station: int) -> tuple[FloatArray, FloatArray] | None:
-    """Return where a station surveyed itself, true less believed place (north, east), and its sigmas."""
+    """Return the place that a station surveyed, less that of the file, and its sigmas."""
     for one in judgement.surveyed:
         if one.point == station:
             return -one.error_m, np.sqrt(np.diag(one.covariance_m2))

@@ -1,4 +1,4 @@
-"""Answer of the smoother's problem to columns of residuals, and what its start and motion had to give for it."""
+"""Response of the smoother's problem to columns of residuals."""
 
 from dataclasses import dataclass
 
@@ -32,7 +32,7 @@ class Response:
 
 
 def respond(problem: Problem, columns: FloatArray) -> Response:
-    """Solve a problem for columns of residuals (r, c), start and motion as believed, and for its own.
+    """Solve a problem for columns of residuals (r, c), and for its own.
 
     The passes are those of the smoother's chain, for all columns at once.
     """
@@ -52,8 +52,8 @@ def respond(problem: Problem, columns: FloatArray) -> Response:
         weighted = H.T * problem.weight[part]
         A = weighted @ H
         U = weighted @ residual[part] - A @ M
-        P = np.linalg.solve(np.eye(size) + P @ A, P)
-        P = 0.5 * (P + P.T)
+        after = np.asarray(np.linalg.solve(np.eye(size) + P @ A, P))
+        P = 0.5 * (after + after.T)
         M = M + P @ U
         kept.append((A, P.copy(), U))
     dual, L = np.zeros((size, width)), np.zeros((size, size))

@@ -59,7 +59,10 @@ def station_findings(answer: StationsAnswer) -> tuple[Finding, ...]:
     found = []
     told = [row.datum for row in answer.datums if row.is_told]
     if told:
-        text = f"stations look to be in {' or '.join(told)}: state them in WGS-84; " + _unknown(answer.rows)
+        text = (
+            f"stations look to be in {' or '.join(told)}: write datum = {told[0]!r} on top of the stations file; "
+            + _unknown(answer.rows)
+        )
         found.append(Finding("warn", "cooperative.station_datum", text))
     for row in answer.with_verdict("off"):
         text = f"station {row.station} is not where the stations file has it: {shift_text(row)}; {_unknown((row,))}"
@@ -115,7 +118,7 @@ def _finding(row: StationRow, text: str) -> Finding:
 def _row(judgement: StationJudgement, session: Session, station: int, vehicles: Sequence[str]) -> StationRow:
     doubt = next((one for one in judgement.doubts if one.station == station), None)
     tests = {test.kind: test for test in (*judgement.tests, *(doubt.tests if doubt else ())) if test.station == station}
-    shift = tests.get(SHIFT)
+    shift = doubt.place if doubt is not None and doubt.place is not None else tests.get(SHIFT)
     delay = next((test for kind, test in tests.items() if kind != SHIFT), None)
     best, worst = judgement.detectable_m(station)
     moves, whose = judgement.metres_per_metre(station)

@@ -10,9 +10,14 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from groundstation.simulation.session_scenario import SessionPoint, SessionScenario, load_session
+from groundstation.base.datums import DATUMS
+from groundstation.simulation.session_scenario import (
+    SessionErrorSigmas,
+    SessionPoint,
+    SessionScenario,
+    load_session,
+)
 from groundstation.systems.cooperative.settings import CooperativeSettings, InsBelief
-from groundstation.systems.cooperative.stations.datums import DATUMS
 
 FIRST_SEED = 90_000
 THIRD = SessionPoint("N3", 20_000.0, 90_000.0)
@@ -76,12 +81,12 @@ class StationCase:
         """Return what the filter believes."""
         scenario = load_session(self.session)
         points = tuple(replace(one, position_sigma_m=self.stated_sigma_m) for one in (*scenario.points, *self.points))
-        return replace(scenario, points=points, errors=replace(scenario.errors, **dict(self.believed)))
+        return replace(scenario, points=points, errors=_errors(scenario.errors, dict(self.believed)))
 
     def true_scenario(self) -> SessionScenario:
         """Return what the session is drawn from."""
         scenario = self.scenario()
-        errors = replace(scenario.errors, **{name: by * getattr(scenario.errors, name) for name, by in self.worse})
+        errors = _errors(scenario.errors, {name: by * getattr(scenario.errors, name) for name, by in self.worse})
         white = np.sqrt(0.5) if self.lasting_s else 1.0
         return replace(
             scenario, errors=errors, link=replace(scenario.link, range_sigma_m=white * scenario.link.range_sigma_m)
@@ -92,6 +97,10 @@ class StationCase:
         errors = self.scenario().errors
         belief = InsBelief(**{item.name: getattr(errors, item.name) for item in fields(InsBelief)})
         return CooperativeSettings(ins=belief, map_window_s=0.0)
+
+
+def _errors(errors: SessionErrorSigmas, changed: dict[str, float]) -> SessionErrorSigmas:
+    return replace(errors, **changed)  # type: ignore[arg-type]
 
 
 KNOWN_CLOCKS = (("clock_m", 0.1), ("clock_mps", 0.01))

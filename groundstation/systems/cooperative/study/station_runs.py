@@ -9,6 +9,7 @@ from multiprocessing import get_context
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.datums import DATUMS
 from groundstation.base.geodesy import curvature_radii_m
 from groundstation.simulation.session import SimulatedSession, simulate_session
 from groundstation.systems.cooperative.algorithms import run_algorithm
@@ -17,8 +18,6 @@ from groundstation.systems.cooperative.events import prepare
 from groundstation.systems.cooperative.loop_types import POINT
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.smoother.smoothed import run_smoothed
-from groundstation.systems.cooperative.stations.datums import DATUMS
-from groundstation.systems.cooperative.stations.hypotheses import SHIFT
 from groundstation.systems.cooperative.stations.judge import StationJudgement, judge_stations
 from groundstation.systems.cooperative.study.runs import WORKERS, Progress
 from groundstation.systems.cooperative.study.station_cases import StationCase
@@ -86,7 +85,7 @@ def run_station_cases(
 
 
 def drawn(case: StationCase, seed: int, run: int) -> tuple[SimulatedSession, Session, dict[int, FloatArray]]:
-    """Simulate a run: with its truth, as the stations file has it, and what is wrong with which station."""
+    """Simulate a run: its truth, the session as the file has it, errors of stations."""
     simulated = simulate_session(case.true_scenario(), seed, run)
     session, own = simulated.session, len(simulated.session.points) - len(case.points)
     points, wrong = list(session.points), dict[int, FloatArray]()
@@ -115,7 +114,7 @@ def drawn(case: StationCase, seed: int, run: int) -> tuple[SimulatedSession, Ses
 
 
 def _lasting(case: StationCase, session: Session, rng: np.random.Generator) -> FloatArray:
-    """Draw the lasting half of the range errors: a first-order Gauss-Markov process of each link."""
+    """Draw the lasting half of the range errors: a Gauss-Markov process of each link."""
     from scipy.signal import lfilter
 
     scenario, ranges = case.scenario(), session.ranges
@@ -170,7 +169,7 @@ def fly_stations(case: StationCase, seed: int, run: int) -> StationRun:
 def _errors(
     simulated: SimulatedSession, session: Session, settings: CooperativeSettings
 ) -> tuple[float, float, list[float]]:
-    """Return RMS error of the smoothed answer, its NEES at the end, and each aircraft's largest error."""
+    """Return RMS error, NEES at the end, and each aircraft's largest error, all smoothed."""
     run = run_smoothed(prepare(session, settings), settings)
     squares, nees, sizes = [], [], []
     for track, truth in zip(run.tracks, simulated.truth, strict=True):
@@ -183,8 +182,8 @@ def _errors(
 
 
 def _inside(judgement: StationJudgement, wrong: dict[int, FloatArray]) -> float:
-    """Tell whether the true shift of the one wrong station lies inside the 95 % ellipse of its estimate."""
-    tests = [test for doubt in judgement.doubts for test in doubt.tests if test.kind == SHIFT and test.station in wrong]
+    """Tell whether the true shift of the wrong station lies inside its 95 % ellipse."""
+    tests = [doubt.place for doubt in judgement.doubts if doubt.place is not None and doubt.station in wrong]
     if len(wrong) != 1 or len(tests) != 1 or not wrong[tests[0].station].any():
         return float("nan")
     miss = tests[0].error_m - wrong[tests[0].station]
@@ -202,7 +201,7 @@ def _survey_nees(judgement: StationJudgement, simulated: SimulatedSession, wrong
 
 
 def _plain_found(session: Session, settings: CooperativeSettings) -> bool:
-    """Ask the plain test: the mean normalised innovation of each link of a station, after the first minute."""
+    """Ask the plain test: mean innovations of each link of a station."""
     prepared = prepare(session, settings)
     judged, events = run_algorithm(prepared, settings, "centralised").judged, prepared.events
     late = (events.time_s[judged.event] > AFTER_S) & (events.kind[judged.event] == POINT)

@@ -1,4 +1,4 @@
-"""Study of ground stations: shares of errors found and of false alarms, with intervals, and what the answer gains."""
+"""Study of ground stations: errors found, false alarms, and what the answer gains."""
 
 from collections.abc import Callable, Sequence
 

@@ -1,4 +1,4 @@
-"""Geodetic datums that a stations file may be in by mistake, against WGS-84.
+"""Geodetic datums other than WGS-84 that places on the ground are stated in.
 
 Each is the transformation that its authority publishes, as the EPSG dataset has it. Differences of a metre and less
 (PZ-90.11, GSK-2011) cannot be seen by ranges over a link and are not among them.
@@ -53,7 +53,7 @@ class Datum:
     east_deg: float = 180.0
 
     def is_used_at(self, latitude_deg: float, longitude_deg: float) -> bool:
-        """Tell whether the datum is in use there; one that crosses the date line has its east below its west."""
+        """Tell whether the datum is in use there; across the date line east is below west."""
         between = self.west_deg <= longitude_deg <= self.east_deg
         if self.east_deg < self.west_deg:
             between = longitude_deg >= self.west_deg or longitude_deg <= self.east_deg
@@ -72,7 +72,7 @@ class Datum:
         return np.asarray(self.shift_m) + (1.0 + 1e-6 * self.scale_ppm) * turned
 
     def error_m(self, latitude_deg: float, longitude_deg: float) -> FloatArray:
-        """Return believed less true place, north and east, of coordinates in this datum taken for WGS-84.
+        """Return believed less true place (north, east) of coordinates taken for WGS-84.
 
         Examples
         --------
@@ -129,3 +129,4 @@ DATUMS = (
         east_deg=154.0,
     ),
 )
+BY_NAME = {datum.name: datum for datum in DATUMS}
