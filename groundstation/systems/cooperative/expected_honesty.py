@@ -183,8 +183,8 @@ def expected_nees(
 def check_pairwise(prepared: Prepared, settings: CooperativeSettings, about: tuple[VehicleTrack, ...]) -> HonestyCheck:
     """Tell from a session itself whether the pairwise filter can be honest in it."""
     limit = settings.pairwise_nees_limit
-    if limit <= 0.0:
-        return HonestyCheck(2.0, "")
+    if limit <= 0.0 or (len(prepared.vehicles) < 3 and not (prepared.points.sigma_m > 0.0).any()):
+        return HonestyCheck(2.0, "")  # two vehicles are one filter, and honest
     found = expected_nees(prepared, settings, about, ENOUGH * limit)
     if found.worst <= limit:
         return HonestyCheck(found.worst, "")

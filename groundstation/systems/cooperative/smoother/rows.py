@@ -12,7 +12,6 @@ from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import LIGHT_MPS
 from groundstation.systems.cooperative.events import Prepared
-from groundstation.systems.cooperative.filters.observation import LIGHT_MPS, NEAREST_M
 from groundstation.systems.cooperative.loop_types import HEIGHT, PEER, POINT, SATELLITE, Events
 from groundstation.systems.cooperative.smoother.knots import Knots
 from groundstation.systems.cooperative.smoother.layout import Layout, pair_of
