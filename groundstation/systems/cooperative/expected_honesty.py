@@ -205,7 +205,7 @@ def _density(prepared: Prepared) -> str:
     minutes = max(end_s - start_s, 1.0) / 60.0
     each = int(is_peer.sum()) / max(pairs, 1) / minutes
     loops = max(pairs - len(prepared.vehicles) + 1, 0)
-    text = f"{each:.3g} encounters a minute of each of {pairs} pairs ({loops} loops)"
+    text = f"{each:.3g} encounters a minute of each of {pairs} pairs ({loops} loop{'' if loops == 1 else 's'})"
     others = int((~is_peer).sum())
     return f"{text} and {others} ranges to points or satellites" if others else text
 
