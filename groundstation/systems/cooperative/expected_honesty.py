@@ -1,8 +1,8 @@
 """Real covariance of the pairwise filter beside the one it claims, without truth.
 
-Stored pairwise cross-covariances are right as long as errors of two vehicles are correlated through one chain of
-encounters. Where encounters are frequent and close loops, or where ground points are heard by some, the factors towards
-third vehicles go wrong and the filter claims less than it makes. Its gains depend on the geometry and on the stated
+Stored pairwise cross-covariances are right where errors of two vehicles are correlated through one chain of encounters.
+Where encounters close loops the factors towards third vehicles go wrong, the more the denser they are, and the filter
+claims less than it makes. Its gains depend on the geometry and on the stated
 sigmas alone, so the covariance that its errors really have under these sigmas can be worked out beside it: the joint
 covariance S of all vehicles and uncertain points goes through the same transitions and gains,
 S = (I - K h) S (I - K h)' + K r K'. The trace of P^-1 S in the plane is the NEES to expect, 2 where P is right.
@@ -191,7 +191,7 @@ def check_pairwise(prepared: Prepared, settings: CooperativeSettings, about: tup
     at_s = float(found.time_s[int(np.argmax(found.nees))])
     reason = (
         f"a NEES of {found.worst:.3g}{'' if found.is_whole else ' or more'} is to be expected at {at_s:.0f} s where 2 "
-        f"is honest (limit {limit:g}), with {_density(prepared)}: it is for sparse encounters that close no loops"
+        f"is honest (limit {limit:g}), with {_density(prepared)}: it is for encounters that close no loops"
     )
     return HonestyCheck(found.worst, reason)
 
