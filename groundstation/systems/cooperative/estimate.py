@@ -1,7 +1,7 @@
 """All algorithms on one session, judged where truth is known: the cooperative answer."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from groundstation.tables.session import Session
 
 SELDOM_GATED = 0.2
 DEFAULT, KNOWN_ON_BOARD = "smoothed", "centralised"
+MOST_MAPPED = 200  # states of all vehicles whose error map is judged
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,7 @@ def estimate_session(
     require_vehicles(prepared)
     prepared, stations = with_stations_judged(prepared, settings)
     truth = truth or {}
+    settings, unmapped = _without_costly_map(prepared, settings)
     judged: list[JudgedRun] = []
     checks: dict[str, HonestyCheck] = {}
     for name in algorithms:
@@ -86,6 +88,7 @@ def estimate_session(
         *(station_findings(stations) if stations else ()),
         *_findings(judged, settings),
         *refusals(checks),
+        *unmapped,
     ]
     slots = len(np.unique(prepared.events.slot[np.isin(prepared.events.kind, (PEER, POINT))]))
     last = max(vehicle.last_s for vehicle in prepared.vehicles)
@@ -119,6 +122,15 @@ def estimate_session(
         ),
     )
     return answer, tuple(findings)
+
+
+def _without_costly_map(prepared: Prepared, settings: CooperativeSettings) -> tuple[CooperativeSettings, list[Finding]]:
+    """Leave out the error map of very many states: it judges a filter, and costs more than all of them."""
+    states = sum(vehicle.size for vehicle in prepared.vehicles)
+    if states <= MOST_MAPPED or settings.map_window_s == 0.0:
+        return settings, []
+    text = f"{states} states: the joint error map is left out, which is made for up to {MOST_MAPPED}"
+    return replace(settings, map_window_s=0.0), [Finding("info", "cooperative.no_error_map", text, count=states)]
 
 
 def _reference_tracks(judged: Sequence[JudgedRun]) -> tuple[VehicleTrack, ...]:

@@ -13,7 +13,7 @@ ALGORITHMS: dict[str, str] = {
     "ranked": "own states, neighbours of a higher rank with their covariance (multilevel)",
     "modified": "ranked, correlated noise of the primaries",
     "split_intersection": "own states, split covariance intersection",
-    "pairwise": "own states and stored pairwise cross-covariances (Luft et al.)",
+    "pairwise": "own states and stored pairwise cross-covariances (Luft et al.), for encounters without loops",
     "smoothed": "batch least squares over all vehicles and the whole session",
 }
 
