@@ -125,7 +125,10 @@ def estimate_session(
 
 
 def _without_costly_map(prepared: Prepared, settings: CooperativeSettings) -> tuple[CooperativeSettings, list[Finding]]:
-    """Leave out the error map of very many states: it judges a filter, and costs more than all of them."""
+    """Leave out the error map of very many states.
+
+    It judges a filter, and costs more than all of them.
+    """
     states = sum(vehicle.size for vehicle in prepared.vehicles)
     if states <= MOST_MAPPED or settings.map_window_s == 0.0:
         return settings, []
