@@ -69,6 +69,12 @@ def _study_along() -> "Callable[..., StudyResult]":
     return study_along
 
 
+def _study_criteria() -> "Callable[..., StudyResult]":
+    from groundstation.systems.landing.criteria_study import study_criteria
+
+    return study_criteria
+
+
 def _folder_standards() -> "tuple[FolderStandard, ...]":
     from groundstation.systems.folder_standard import FolderStandard
     from groundstation.systems.landing.unstable import KIND, SHIPPED, judge
@@ -81,6 +87,11 @@ SYSTEM = System(
     name="landing",
     analyses=(LANDING, LANDING_BEACONS),
     studies=(
+        Study(
+            "criteria",
+            "criteria of approaches: verdicts on flap, gear, speed and wind against what was flown",
+            _study_criteria,
+        ),
         Study(
             "approach",
             "recorded approaches: the localizer as a reference for positions, how honest its interval is",
