@@ -14,7 +14,8 @@ AnswerT = TypeVar("AnswerT", bound=Answer)
 # What statistics and pages of all flights read of the columns that systems give, empty where no system gives them.
 READ_BY_FLEETS: Mapping[str, Kind] = {
     **dict.fromkeys(("verdict", "ins_kind", "magnetic_verdict", "magnetic_method"), "category"),
-    **dict.fromkeys(("flux_verdict", "flux_method"), "category"),
+    **dict.fromkeys(("flux_verdict", "flux_method", "units_verdict"), "category"),
+    "units_off": "text",
     "verdict_reason": "text",
     "samples": "count",
     **dict.fromkeys(
