@@ -11,6 +11,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.systems.cooperative.events import Prepared
+from groundstation.systems.cooperative.filters.observation import LIGHT_MPS, NEAREST_M
 from groundstation.systems.cooperative.loop_types import HEIGHT, PEER, POINT, SATELLITE, Events
 from groundstation.systems.cooperative.smoother.knots import Knots
 from groundstation.systems.cooperative.smoother.layout import Layout, pair_of
