@@ -1,6 +1,6 @@
 """Part of the session's chapter on its ground stations."""
 
-from groundstation.chapters.parts import Grid, Head, Mark, Note, Part, Tone
+from groundstation.chapters.parts import Grid, Head, Mark, Part, Tone
 from groundstation.chapters.wording import named_quantity, number
 from groundstation.systems.cooperative.answer import CooperativeResult
 from groundstation.systems.cooperative.stations_answer import StationRow, StationsAnswer
@@ -74,15 +74,7 @@ def stations_parts(answer: CooperativeResult) -> tuple[Part | None, ...]:
     stations = answer.stations
     if stations is None:
         return ()
-    note = None
-    if stations.raised:
-        raised = ", ".join(f"{named_quantity(name)[0]} {number(by, 1)} times" for name, by in stations.raised.items())
-        note = Note(
-            f"The session shows larger errors of INS and clocks than were stated ({raised}); the stations are tested "
-            "with these.",
-            "warn",
-        )
-    return (_stations(stations), note, _reliability(stations), _protection(stations), _datums(stations))
+    return (_stations(stations), _reliability(stations), _protection(stations), _datums(stations))
 
 
 def _size(row: StationRow) -> str:
@@ -106,7 +98,15 @@ def _stations(stations: StationsAnswer) -> Grid:
         )
         for row in stations.rows
     ]
-    return Grid("Ground stations", STATION_HEADS, rows, STATION_CAPTION)
+    return Grid("Ground stations", STATION_HEADS, rows, STATION_CAPTION + _tested_with(stations))
+
+
+def _tested_with(stations: StationsAnswer) -> str:
+    raised = [f"{named_quantity(name)[0]} {number(by, 1)} times" for name, by in stations.raised.items()]
+    said = f" Tested with sigmas as large as the session shows them: {', '.join(raised)} the stated." if raised else ""
+    if stations.repetition > 1.0:
+        said += f" Readings repeat themselves: {number(stations.repetition, 1)} count as one."
+    return said
 
 
 def _reliability(stations: StationsAnswer) -> Grid:

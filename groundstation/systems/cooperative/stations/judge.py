@@ -202,7 +202,7 @@ def _doubts(found: Sequence[StationTest], number: int) -> list[Doubt]:
 
 
 def _placed(doubt: Doubt, session: Session, settings: CooperativeSettings) -> Doubt:
-    """Return the doubt with the place that the session gives the station when it alone is free."""
+    """Return the doubt with the place of the station when it alone is free."""
     if doubt.left_out:
         return doubt
     shift = next(test for test in doubt.tests if test.kind == SHIFT)
