@@ -6,6 +6,18 @@ from typing import Literal
 StationVerdict = Literal["fits", "off", "one of several", "left out"]
 
 
+def digits_of(metres: float | None) -> int:
+    """Return the decimals that a length is told with: aircraft are off by metres, robots by centimetres.
+
+    Examples
+    --------
+    >>> [digits_of(metres) for metres in (530.7, -12.3, 0.942, None)]
+    [0, 1, 2, 0]
+    """
+    size = abs(metres) if metres is not None else 100.0
+    return 0 if size >= 20.0 else 1 if size >= 2.0 else 2
+
+
 @dataclass(frozen=True)
 class StationRow:
     """One ground station as the ranges judge it.

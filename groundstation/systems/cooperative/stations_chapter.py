@@ -3,7 +3,7 @@
 from groundstation.chapters.parts import Grid, Head, Mark, Part, Tone
 from groundstation.chapters.wording import named_quantity, number
 from groundstation.systems.cooperative.answer import CooperativeResult
-from groundstation.systems.cooperative.stations_answer import StationRow, StationsAnswer
+from groundstation.systems.cooperative.stations_answer import StationRow, StationsAnswer, digits_of
 
 STATION_HEADS = (
     *(Head("Station"), Head("Judged"), Head("Ranges", True), Head("Chance if right", True)),
@@ -52,7 +52,7 @@ def stations_warning(answer: CooperativeResult) -> str:
     for row in stations.with_verdict("off"):
         said.append(
             f"Station {row.station} is {_size(row)} off its place in the stations file; the answer takes its place as "
-            f"unknown by {number(row.used_sigma_m, 0, 'm')}."
+            f"unknown by {number(row.used_sigma_m, digits_of(row.used_sigma_m), 'm')}."
         )
     several = stations.with_verdict("one of several")
     if several:
@@ -63,7 +63,7 @@ def stations_warning(answer: CooperativeResult) -> str:
         )
     for row in stations.with_verdict("left out"):
         said.append(
-            f"Ranges of station {row.station} are off by {number(row.delay_m, 0, 'm', signed=True)} (clock or delay); "
+            f"Ranges of station {row.station} are off by {number(row.delay_m, digits_of(row.delay_m), 'm', signed=True)} (clock or delay); "
             "the answer does not use them."
         )
     return " ".join(said)
@@ -78,9 +78,9 @@ def stations_parts(answer: CooperativeResult) -> tuple[Part | None, ...]:
 
 
 def _size(row: StationRow) -> str:
-    return (
-        f"{number(row.shift_m, 0, 'm')} ± {number(None if row.shift_sigma_m is None else 1.96 * row.shift_sigma_m, 0)}"
-    )
+    digits = digits_of(row.shift_m)
+    half = None if row.shift_sigma_m is None else 1.96 * row.shift_sigma_m
+    return f"{number(row.shift_m, digits, 'm')} ± {number(half, digits)}"
 
 
 def _stations(stations: StationsAnswer) -> Grid:
@@ -93,8 +93,8 @@ def _stations(stations: StationsAnswer) -> Grid:
             _with_sigma(row.shift_m, row.shift_sigma_m),
             number(row.shift_direction_deg, 0),
             _with_sigma(row.delay_m, row.delay_sigma_m, signed=True),
-            number(row.stated_sigma_m, 1),
-            "not used" if row.verdict == "left out" else number(row.used_sigma_m, 1),
+            number(row.stated_sigma_m, digits_of(row.stated_sigma_m) or 1),
+            "not used" if row.verdict == "left out" else number(row.used_sigma_m, digits_of(row.used_sigma_m) or 1),
         )
         for row in stations.rows
     ]
@@ -118,14 +118,20 @@ def _reliability(stations: StationsAnswer) -> Grid:
 
 
 def _with_sigma(value: float | None, sigma: float | None, *, signed: bool = False) -> str:
-    return "" if value is None or sigma is None else f"{number(value, 0, signed=signed)} ± {number(sigma, 0)}"
+    return (
+        ""
+        if value is None or sigma is None
+        else f"{number(value, digits_of(value), signed=signed)} ± {number(sigma, digits_of(sigma))}"
+    )
 
 
 def _best_to_worst(row: StationRow) -> str:
     if row.detectable_best_m is None:
         return "none"
-    worst = "none" if row.detectable_worst_m is None else number(row.detectable_worst_m, 0)
-    return f"{number(row.detectable_best_m, 0)} to {worst}"
+    worst = (
+        "none" if row.detectable_worst_m is None else number(row.detectable_worst_m, digits_of(row.detectable_worst_m))
+    )
+    return f"{number(row.detectable_best_m, digits_of(row.detectable_best_m))} to {worst}"
 
 
 def _surveyed(row: StationRow) -> str:
@@ -136,7 +142,10 @@ def _surveyed(row: StationRow) -> str:
 
 
 def _protection(stations: StationsAnswer) -> Grid:
-    rows = [(row.vehicle, number(row.worst_m, 0), number(row.end_m, 0)) for row in stations.protection]
+    rows = [
+        (row.vehicle, number(row.worst_m, digits_of(row.worst_m)), number(row.end_m, digits_of(row.end_m)))
+        for row in stations.protection
+    ]
     return Grid("Protection level", PROTECTION_HEADS, rows, PROTECTION_CAPTION)
 
 

@@ -20,6 +20,7 @@ from groundstation.systems.cooperative.stations_answer import (
     StationRow,
     StationsAnswer,
     StationVerdict,
+    digits_of,
 )
 from groundstation.tables.session import Session
 
@@ -78,9 +79,10 @@ def station_findings(answer: StationsAnswer) -> tuple[Finding, ...]:
         found += [_finding(row, text) for row in several[:1]]
     for row in answer.with_verdict("left out"):
         low, high = _interval(row.delay_m or 0.0, row.delay_sigma_m or 0.0)
+        n = digits_of(row.delay_m)
         text = (
-            f"ranges of station {row.station} are off by {row.delay_m:+.0f} m (95 %: {low:+.0f} to {high:+.0f}): its "
-            "clock or a delay, no shift of its place explains it; the answer does not use them"
+            f"ranges of station {row.station} are off by {row.delay_m:+.{n}f} m (95 %: {low:+.{n}f} to {high:+.{n}f}): "
+            "its clock or a delay, no shift of its place explains it; the answer does not use them"
         )
         found.append(_finding(row, text))
     return tuple(found)
@@ -91,7 +93,8 @@ def shift_text(row: StationRow) -> str:
     if row.shift_m is None or row.shift_sigma_m is None:
         return "no shift can be seen"
     low, high = _interval(row.shift_m, row.shift_sigma_m)
-    where = f"ranges put it {row.shift_m:.0f} m (95 %: {max(low, 0.0):.0f} to {high:.0f}) towards "
+    n = digits_of(row.shift_m)
+    where = f"ranges put it {row.shift_m:.{n}f} m (95 %: {max(low, 0.0):.{n}f} to {high:.{n}f}) towards "
     return where + f"{row.shift_direction_deg:.0f} deg of there"
 
 
@@ -107,7 +110,7 @@ def _unknown(rows: Sequence[StationRow]) -> str:
     moved = [row for row in rows if row.verdict in ("off", "one of several")]
     if not moved:
         return "the answer takes them as they are"
-    sigmas = " and ".join(f"{row.used_sigma_m:.0f} m" for row in moved)
+    sigmas = " and ".join(f"{row.used_sigma_m:.{digits_of(row.used_sigma_m)}f} m" for row in moved)
     return f"the answer takes {'its place' if len(moved) == 1 else 'their places'} as unknown by {sigmas}"
 
 
