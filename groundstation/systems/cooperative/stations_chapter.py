@@ -63,7 +63,8 @@ def stations_warning(answer: CooperativeResult) -> str:
         )
     for row in stations.with_verdict("left out"):
         said.append(
-            f"Ranges of station {row.station} are off by {number(row.delay_m, digits_of(row.delay_m), 'm', signed=True)} (clock or delay); "
+            f"Ranges of station {row.station} are off by "
+            f"{number(row.delay_m, digits_of(row.delay_m), 'm', signed=True)} (clock or delay); "
             "the answer does not use them."
         )
     return " ".join(said)
