@@ -255,6 +255,14 @@ def test_negative_ranges() -> None:
     assert len(found.session.ranges) == len(simulated().session.ranges) - 1
 
 
+def test_two_way_ranges_have_no_clock_in_them() -> None:
+    flights = recorded()
+    for two_way in (False, True):
+        found = session_from_flights(flights, stations_of(), settings=SessionSettings(two_way=two_way))
+        assert found.session.ranges.is_two_way is two_way
+        assert found.session.ranges.take(slice(0, 5)).is_two_way is two_way
+
+
 def test_a_time_of_transmission_that_is_not_that_of_the_log() -> None:
     a, b, c = recorded()
     sent = a["link.B"].values("transmission_time_s").copy()

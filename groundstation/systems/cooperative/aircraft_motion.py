@@ -32,7 +32,9 @@ from groundstation.systems.cooperative.loop_types import (
 
 TERMS, SMALLEST = 40, 1e-16  # of the series of a step; the largest entry of a transition is 1 or more
 SAME_TIME_S, SAME_STEP_S = 1e-9, 1e-12
-MOST_KEPT = 40_000  # numbers in the transitions that are kept of one aircraft, in matrices
+FEWEST_TERMS, SPAN_S = 4, 1.0  # of a series; steps for which it is made
+AT_ONCE = 64  # epochs whose series are made together
+MOST_KEPT = 500_000  # numbers of the transitions that are kept of one aircraft
 
 
 class FlownAircraft(Protocol):
@@ -137,41 +139,37 @@ def _fill_platform(flown: FloatArray, gyro_s: float, F: FloatArray) -> None:
 
 
 class Powers(NamedTuple):
-    """Terms of the series of a step of dx/dt = F x + w, for steps up to ``span_s``.
+    """Terms of the series of steps of dx/dt = F x + w, each up to ``span_s`` long.
 
-    Phi = sum (F h)^k / k!; Q = sum L_k h^(k+1) / (k+1)! with L_0 = diag(q), L_(k+1) = F L_k + L_k F'.
+    They are those of some epochs. Phi = sum (F h)^k / k!; Q = sum L_k h^(k+1) / (k+1)! with L_0 = diag(q), L_(k+1) = F L_k + L_k F'.
     """
 
-    transition: FloatArray  # (terms, n n)
+    first: int  # epoch
+    transition: FloatArray  # (epochs, terms, n n)
     noise: FloatArray  # the same
     exponents: FloatArray  # (terms,) 0, 1, ...
     span_s: float
 
     @classmethod
-    def of(cls, F: FloatArray, density: FloatArray, span_s: float) -> "Powers":
-        """Sum no further than a step of ``span_s`` needs."""
-        n = len(F)
-        term, level = np.eye(n), np.diag(density)
-        terms, levels, largest = [term], [level], 1.0
+    def of(cls, first: int, F: FloatArray, density: FloatArray, span_s: float) -> "Powers":
+        """Sum no further than a step of ``span_s`` needs; F (epochs, n, n)."""
+        term, level = np.broadcast_to(np.eye(len(density)), F.shape), np.broadcast_to(np.diag(density), F.shape)
+        terms, levels = [term], [level]
         for k in range(1, TERMS):
             term, moved = F @ term / k, F @ level
-            level = (moved + moved.T) / (k + 1)
+            level = (moved + moved.swapaxes(1, 2)) / (k + 1)
             terms.append(term)
             levels.append(level)
-            largest = float(np.abs(term).max()) * span_s**k
-            if k >= 4 and largest < SMALLEST:
+            if k >= FEWEST_TERMS and float(np.abs(term).max()) * span_s**k < SMALLEST:
                 break
-        return cls(
-            np.reshape(terms, (len(terms), -1)),
-            np.reshape(levels, (len(terms), -1)),
-            np.arange(float(len(terms))),
-            span_s,
-        )
+        shape = (len(F), len(terms), -1)
+        exponents = np.arange(float(len(terms)))
+        return cls(first, np.stack(terms, 1).reshape(shape), np.stack(levels, 1).reshape(shape), exponents, span_s)
 
-    def step(self, n: int, step_s: float) -> tuple[FloatArray, FloatArray]:
+    def step(self, epoch: int, n: int, step_s: float) -> tuple[FloatArray, FloatArray]:
         """Transition and covariance of the noise; the latter means nothing for a step back."""
-        powers = step_s**self.exponents
-        return (powers @ self.transition).reshape(n, n), (powers * step_s @ self.noise).reshape(n, n)
+        powers, at = step_s**self.exponents, epoch - self.first
+        return (powers @ self.transition[at]).reshape(n, n), (powers * step_s @ self.noise[at]).reshape(n, n)
 
 
 class AircraftMotion:
@@ -181,7 +179,7 @@ class AircraftMotion:
         self._vehicle, self._dynamics = vehicle, dynamics(vehicle)
         self._time_s: list[float] = vehicle.epochs[:, TIME].tolist()
         self._times = vehicle.epochs[:, TIME]
-        self._powers: dict[int, Powers] = {}
+        self._powers: Powers | None = None
         self._kept: dict[tuple[float, float], tuple[FloatArray, FloatArray]] = {}
         self._is_local = vehicle.model == LOCAL
 
@@ -193,20 +191,19 @@ class AircraftMotion:
             found = self._short(0, to_s - from_s) if self._is_local else self._over_epochs(from_s, to_s)
             for part in found:
                 part.flags.writeable = False
-            if len(self._kept) * found[0].size >= MOST_KEPT * 49:
+            if len(self._kept) * found[0].size >= MOST_KEPT:
                 self._kept.clear()
             self._kept[key] = found
         return found
 
     def _short(self, epoch: int, step_s: float) -> tuple[FloatArray, FloatArray]:
         """Step with the dynamics of one epoch."""
-        powers = self._powers.get(epoch)
-        if powers is None or abs(step_s) > powers.span_s:
-            if len(self._powers) > 4:
-                self._powers.clear()
-            powers = Powers.of(self._dynamics[epoch], self._vehicle.density, max(abs(step_s), 1.0))
-            self._powers[epoch] = powers
-        return powers.step(self._vehicle.size, step_s)
+        powers, length = self._powers, abs(step_s)
+        if powers is None or length > powers.span_s or not powers.first <= epoch < powers.first + len(powers.noise):
+            first = epoch - epoch % AT_ONCE
+            part = self._dynamics[first : first + AT_ONCE]
+            powers = self._powers = Powers.of(first, part, self._vehicle.density, max(length, SPAN_S))
+        return powers.step(epoch, self._vehicle.size, step_s)
 
     def _over_epochs(self, from_s: float, to_s: float) -> tuple[FloatArray, FloatArray]:
         """Step in the global frame, piece by piece between the epochs of the dead reckoning."""

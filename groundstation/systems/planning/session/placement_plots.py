@@ -82,7 +82,7 @@ def _accuracy_on_a_line(answer: PlacementPlan, north: Floats, east: Floats, sigm
     placed = (moved.east_m if name == "east" else moved.north_m) / M_PER_KM
     marks: list[AnyMark] = [
         Curve(x=along, y=sigma, role="ink", name="weighted sigma"),
-        Limit(value=placed, is_upright=True, name="placed"),
+        Limit(value=placed, is_upright=True, label="placed"),
     ]
     x_axis = Axis(f"{name}, km", low=float(along[0]), high=float(along[-1]))
     return Plot(
