@@ -11,8 +11,8 @@ from groundstation.systems.landing.answer import (
     HeightError,
     LandingResult,
     PositionError,
-    Touchdown,
 )
+from groundstation.systems.landing.touchdown_answer import Touchdown
 
 Value = TypeVar("Value")
 
@@ -133,7 +133,10 @@ COLUMNS: tuple[AnswerColumn[LandingResult], ...] = (
         _flown(lambda flown: flown.vertical_rms_dots),
     ),
     AnswerColumn(
-        "landing_sink_rate_mps", "number", "before the last touchdown", _touchdown(lambda one: one.sink_rate_mps)
+        "landing_sink_rate_mps",
+        "number",
+        "onto the runway over the last second before the last touchdown",
+        _touchdown(lambda one: one.sink_rate_mps),
     ),
     AnswerColumn("landing_peak_load_g", "number", "around it", _touchdown(lambda one: one.peak_load_g)),
     AnswerColumn(

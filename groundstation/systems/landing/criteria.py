@@ -9,7 +9,7 @@ import numpy as np
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import M_PER_FOOT
 from groundstation.results.gates import Gate
-from groundstation.systems.landing.answer import AlongError, PositionError, RunwayUsed, StabilisedAt, Touchdown
+from groundstation.systems.landing.answer import AlongError, PositionError, RunwayUsed, StabilisedAt
 from groundstation.systems.landing.criteria_answer import KINDS, Criterion, CriterionState, Place, Score
 from groundstation.systems.landing.criteria_settings import Limits, is_within
 from groundstation.systems.landing.geometry import RelativeToRunway
@@ -18,6 +18,7 @@ from groundstation.systems.landing.path import FlightPath
 from groundstation.systems.landing.settings import LandingSettings
 from groundstation.systems.landing.stabilised import PERCENT, place_at, rows_below
 from groundstation.systems.landing.sustained import worst_sustained
+from groundstation.systems.landing.touchdown_answer import Touchdown
 
 if TYPE_CHECKING:
     from groundstation.systems.landing.finals import Final

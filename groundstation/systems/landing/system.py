@@ -83,6 +83,12 @@ def _folder_standards() -> "tuple[FolderStandard, ...]":
     return (FolderStandard(KIND, SHIPPED, judge, document),)
 
 
+def _study_touchdown() -> "Callable[..., StudyResult]":
+    from groundstation.systems.landing.touchdown_study import study_touchdown
+
+    return study_touchdown
+
+
 SYSTEM = System(
     name="landing",
     analyses=(LANDING, LANDING_BEACONS),
@@ -101,6 +107,7 @@ SYSTEM = System(
         Study(
             "runways", "choice of the runway from the table: how often one is named, and the right one", _study_runways
         ),
+        Study("touchdown", "touchdowns: time by all that shows it, and how honest its interval is", _study_touchdown),
     ),
     chapters=_chapters,
     plots=_plots,
