@@ -30,7 +30,8 @@ NODES = np.linspace(-2.4, 2.4, 9)  # of the error of the ground that all samples
 
 def by_height(heights: Heights, ground: Ground | None, grid_s: FloatArray) -> Hint:
     """Likelihood of the contact by the heights of one source."""
-    name = f"height ({heights.kind.field.removesuffix('_m').replace('_', ' ')})"
+    field = heights.kind.field.removesuffix("_m").replace("_", " ")
+    name = "radio altitude" if heights.kind.topic_kind == "radio_altimeter" else f"height ({field})"
     rate = heights.rate_hz
     if ground is None:
         return Hint(name, heights.topic, rate, None, "no roll-out behind it")

@@ -38,7 +38,7 @@ def _not_claimed(one: Approach) -> Facts | None:
 
 
 def _facts(one: Approach, down: Touchdown) -> Facts:
-    by = f"by {typeset(down.found_by)}" if down.found_by else ""
+    by = f"{number(down.time_s, 1, 's')} of flight" + (f", by {typeset(down.found_by)}" if down.found_by else "")
     pairs = [
         ("Time", f"{clock(down.time_s)} {_interval(down)}", f"95 %; {by}"),
         ("Place", f"{number(down.latitude_deg, 5, '°')}, {number(down.longitude_deg, 5, '°')}", _along(down)),

@@ -86,7 +86,7 @@ def test_the_first_guess_does_not_matter(guess_off_s: float) -> None:
     [
         (replace(NOTHING, load_hz=16.0), "normal acceleration", 0.3),
         (replace(NOTHING, wheel_speed_hz=4.0), "wheel speed", 0.4),
-        (replace(NOTHING, radio_hz=4.0), "height", 3.0),
+        (replace(NOTHING, radio_hz=4.0), "radio altitude", 3.0),
         (replace(NOTHING, has_altitude=True, has_vertical_speed=True, receiver_hz=10.0), "height", 3.0),
         (replace(NOTHING, pitch_hz=10.0), "pitch", 2.0),
         (replace(NOTHING, wheels_hz=1.0), "weight on wheels", 1.0),
