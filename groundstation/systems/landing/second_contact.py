@@ -6,6 +6,7 @@ from groundstation.systems.landing.evidence import Evidence
 from groundstation.systems.landing.touchdown_answer import SecondContact
 from groundstation.systems.landing.witnesses import SLOWEST_LOAD_HZ, jumps_of
 
+IMPACT_S = 0.4  # of the contact before, which is left out
 SOONEST_S, LATEST_S = 0.5, 6.0  # of a second contact behind the first
 LIGHT_G, LIGHT_S = 0.95, 0.4  # the load in between stays below that for so long
 SECOND_G = 0.15  # least jump
@@ -22,7 +23,7 @@ def second_contacts(evidence: Evidence) -> tuple[SecondContact, ...]:
     for at_s, size_g in zip(jumps.time_s, jumps.size_g, strict=True):
         if not SOONEST_S <= at_s - evidence.time_s <= LATEST_S or size_g < SECOND_G:
             continue
-        between = (load.time_s > before_s) & (load.time_s < at_s)
+        between = (load.time_s > before_s + IMPACT_S) & (load.time_s < at_s)
         light_s = float(np.count_nonzero(load.load_g[between] < LIGHT_G)) / load.rate_hz
         mean_g = float(np.mean(load.load_g[between])) if between.any() else 1.0
         if light_s >= LIGHT_S and mean_g < 1.0:

@@ -61,7 +61,7 @@ def _interval(down: Touchdown) -> str:
     if down.confidence95_s is None:
         return f"± {number(NORMAL_95 * down.time_sigma_s, 1, 's')}"
     early, late = down.time_s - down.confidence95_s[0], down.confidence95_s[1] - down.time_s
-    return f"− {number(early, 1)} + {number(late, 1, 's')}"
+    return f"({number(-early, 1, signed=True)} … {number(late, 1, 's', signed=True)})"
 
 
 def _along(down: Touchdown) -> str:
