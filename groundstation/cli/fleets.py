@@ -24,8 +24,7 @@ from groundstation.cli.application import (
 )
 
 if TYPE_CHECKING:
-    from groundstation.base.shipped_toml import TomlFile
-    from groundstation.systems.folder_standard import FolderStandard
+    from groundstation.pipeline.verbs.folder_standards import ChosenStandard
 
 # Decision -> what ``--fail-on`` may say for it to be exit 4.
 REACHED_AT = {"fail": ("warn", "fail"), "not enough flights": ("warn",), "not flown": ("warn",)}
@@ -85,14 +84,17 @@ def acceptance(out: Path, standard: str, output: Path | None, fail_on: FailOnMod
 
 def _held_to(
     out: Path,
-    own: "tuple[FolderStandard, TomlFile]",
+    own: "ChosenStandard",
     output: Path | None,
     fail_on: FailOnMode,
     *,
     quiet: bool,
     json: bool,
 ) -> int:
-    """Hold the flights of a folder to the standard of a system, with the exit codes of an acceptance."""
+    """Hold the flights of a folder to the standard of a system.
+
+    Exit codes are those of an acceptance.
+    """
     from groundstation.chapters.wording import NARROW_SPACE
     from groundstation.cli.text import as_json, printable
     from groundstation.pipeline.verbs.folder_standards import hold_to

@@ -1,4 +1,4 @@
-"""Standard of one system that the flights of a folder are held against, from what they saved."""
+"""Standard of one system that the saved flights of a folder are held against."""
 
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
@@ -17,7 +17,7 @@ class HeldTo(Protocol):
 
     @property
     def decision(self) -> ShareDecision:
-        """Whether the flights keep the standard."""
+        """Decision on the flights."""
         ...
 
     @property

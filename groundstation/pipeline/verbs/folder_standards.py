@@ -15,7 +15,7 @@ from groundstation.systems.folder_standard import FolderStandard, HeldTo
 
 
 class Held(NamedTuple):
-    """Answer of a standard: what was written, the line for people, flights that cannot be read."""
+    """Answer of a standard, its line for people, what was written, what was unread."""
 
     answer: HeldTo
     line: str
@@ -24,8 +24,15 @@ class Held(NamedTuple):
     unread: list[str]
 
 
-def standard_of(name_or_path: str) -> tuple[FolderStandard, TomlFile] | None:
-    """Find the standard of a name or a file among those of the systems; None where it is of none.
+class ChosenStandard(NamedTuple):
+    """Standard of a system, and the file that states its limits."""
+
+    standard: FolderStandard
+    file: TomlFile
+
+
+def standard_of(name_or_path: str) -> ChosenStandard | None:
+    """Find the standard of a name or a file; None where it is of no system.
 
     Raises
     ------
@@ -34,17 +41,12 @@ def standard_of(name_or_path: str) -> tuple[FolderStandard, TomlFile] | None:
     """
     for one in systems().folder_standards:
         if name_or_path.lower() in one.shipped.names():
-            return one, one.shipped.read(name_or_path)
+            return ChosenStandard(one, one.shipped.read(name_or_path))
     if not name_or_path.endswith(SUFFIX):
         return None
     file = ShippedToml("groundstation", "", "standard").read(name_or_path)
     kind = file.table.get("kind")
-    return next(((one, file) for one in systems().folder_standards if one.kind == kind), None)
-
-
-def shipped_names() -> tuple[str, ...]:
-    """Names of the standards that ship with the systems."""
-    return tuple(name for one in systems().folder_standards for name in one.shipped.names())
+    return next((ChosenStandard(one, file) for one in systems().folder_standards if one.kind == kind), None)
 
 
 def hold_to(out: Path, standard: FolderStandard, file: TomlFile, folder: Path | None = None) -> Held:

@@ -66,7 +66,7 @@ class _Truth(NamedTuple):
     tailwind_mps: float
 
     def is_met(self, name: str) -> bool:
-        """Whether the criterion was truly kept from the lower check height down."""
+        """Tell whether the criterion was truly kept from the lower check height down."""
         return {
             "flap": self.flap_m >= CHECK_M,
             "gear": self.gear_m >= CHECK_M,
