@@ -27,9 +27,9 @@ def second_contacts(evidence: Evidence) -> tuple[SecondContact, ...]:
         light_s = float(np.count_nonzero(load.load_g[between] < LIGHT_G)) / load.rate_hz
         mean_g = float(np.mean(load.load_g[between])) if between.any() else 1.0
         if light_s >= LIGHT_S and mean_g < 1.0:
-            here = (load.time_s >= at_s - 0.1) & (load.time_s <= at_s + 0.4)
-            found.append(
-                SecondContact(float(at_s), float(np.max(load.load_g[here])), f"{load.topic}, {light_s:.1f} s light")
-            )
+            here = np.flatnonzero((load.time_s >= at_s) & (load.time_s <= at_s + IMPACT_S + 0.1))
+            top = int(here[np.argmax(load.load_g[here])]) if here.size else len(load.time_s) - 1
+            told = f"{load.topic}, {light_s:.1f} s light"
+            found.append(SecondContact(float(load.time_s[top]), float(load.load_g[top]), told))
         before_s = float(at_s)
     return tuple(found)

@@ -253,11 +253,13 @@ def test_every_study_is_listed_and_no_other_is_run(tmp_path: Path) -> None:
         "trajectory",
         "magnetic",
         "flux",
+        "criteria",
         "approach",
         "along",
         "runways",
         "touchdown",
         "cooperative",
+        "stations",
         "control",
         "landing",
     ]
