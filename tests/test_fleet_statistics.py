@@ -366,7 +366,7 @@ def test_flux_valves_are_compared_with_flux_valves_by_what_both_show() -> None:
     other = deviation_columns(np.array([[math.nan] * 5, [math.nan] * 5, [9.0] * 5]), 0.1)
     rows = deviations(table(**columns, **other))
     assert [(row.sensor, row.flight_id, row.others) for row in rows] == [
-        ("magnetic", "F0002", 0),
+        ("magnetometer", "F0002", 0),
         ("flux", "F0000", 1),
         ("flux", "F0001", 1),
     ]

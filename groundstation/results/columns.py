@@ -27,8 +27,8 @@ READ_BY_FLEETS: Mapping[str, Kind] = {
             *("health_vibration_mps2", "health_hdop", "health_test_ratio"),
             *("onboard_heading_rms_deg", "onboard_tilt_rms_deg"),
             *(
-                f"{sensor}_{letter.lower()}{end}_deg"
-                for sensor in ("magnetic", "flux")
+                f"{sensor}{letter.lower()}{end}_deg"
+                for sensor in ("magnetic_", "flux_")
                 for letter in LETTERS
                 for end in ("", "_sigma")
             ),

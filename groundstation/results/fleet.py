@@ -212,7 +212,7 @@ class FleetDeviationRow:
     ``expected_rms_deg`` what their sigmas lead to expect of it; None where there is nothing to compare with. A
     coefficient that the headings flown do not show is NaN.
 
-    ``sensor`` is ``magnetic`` of a magnetometer, ``flux`` of a compass of heading alone.
+    ``sensor`` is ``magnetometer`` or ``flux``, a compass of heading alone.
     """
 
     aircraft: str
@@ -227,7 +227,7 @@ class FleetDeviationRow:
     others: int
     difference_rms_deg: float | None
     expected_rms_deg: float | None
-    sensor: str = "magnetic"
+    sensor: str = "magnetometer"
 
     def error_deg(self, heading_deg: NDArray[np.float64]) -> NDArray[np.float64]:
         """Evaluate A + B sin c + C cos c + D sin 2c + E cos 2c, shape (n,).

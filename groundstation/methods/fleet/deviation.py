@@ -11,7 +11,7 @@ from groundstation.results.roles import LETTERS
 
 FloatArray = NDArray[np.float64]
 NOT_COMPARED = "reject"
-SENSORS = ("magnetic", "flux")  # first part of their columns
+SENSORS = {"magnetometer": "magnetic_", "flux": "flux_"}  # with the first part of their columns
 SURE = 3  # A to C, which a fit shows or is none; D and E may be open
 
 
@@ -37,12 +37,12 @@ def deviations(flights: FigureData) -> tuple[FleetDeviationRow, ...]:
 
 
 def _of_sensor(flights: FigureData, sensor: str) -> list[FleetDeviationRow]:
+    start = SENSORS[sensor]
     values, sigmas = (
-        np.column_stack([flights[f"{sensor}_{letter.lower()}{end}_deg"] for letter in LETTERS])
-        for end in ("", "_sigma")
+        np.column_stack([flights[f"{start}{letter.lower()}{end}_deg"] for letter in LETTERS]) for end in ("", "_sigma")
     )
     known = np.isfinite(values[:, :SURE]).all(axis=1) & np.isfinite(sigmas[:, :SURE]).all(axis=1)
-    aircraft, verdict = flights["aircraft"], flights[f"{sensor}_verdict"]
+    aircraft, verdict = flights["aircraft"], flights[f"{start}verdict"]
     is_compared = known & (verdict != NOT_COMPARED) & (aircraft != "")
     rows = np.flatnonzero(known).tolist()
     rows.sort(key=lambda row: (str(aircraft[row]), _time(flights, row) or 0, str(flights["flight_id"][row])))
@@ -57,11 +57,11 @@ def _of_sensor(flights: FigureData, sensor: str) -> list[FleetDeviationRow]:
                 flight_id=str(flights["flight_id"][row]),
                 start_utc_ns=_time(flights, row),
                 verdict=str(verdict[row]),
-                method=str(flights[f"{sensor}_method"][row]),
+                method=str(flights[f"{start}method"][row]),
                 coefficients_deg=dict(zip(LETTERS, values[row].tolist(), strict=True)),
                 coefficients_sigma_deg=dict(zip(LETTERS, sigmas[row].tolist(), strict=True)),
-                before_rms_deg=_known(flights[f"{sensor}_before_rms_deg"][row]),
-                after_rms_deg=_known(flights[f"{sensor}_after_rms_deg"][row]),
+                before_rms_deg=_known(flights[f"{start}before_rms_deg"][row]),
+                after_rms_deg=_known(flights[f"{start}after_rms_deg"][row]),
                 others=len(others),
                 difference_rms_deg=difference,
                 expected_rms_deg=expected,

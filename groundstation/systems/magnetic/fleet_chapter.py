@@ -11,7 +11,7 @@ from groundstation.systems.magnetic.flux_answer import FLUX_TITLES
 
 TITLE = "Magnetic deviation by aircraft"
 LEAD = "What each flight found with its figure-eight or its legs: does the deviation of an aircraft stay the same?"
-SENSORS = {"magnetic": "magnetometer", "flux": "heading alone"}
+SENSORS = {"magnetometer": "magnetometer", "flux": "heading alone"}
 METHODS = {str(name): title for name, title in (*METHOD_TITLES.items(), *FLUX_TITLES.items())}
 CHANGED = 3.0  # times what the sigmas lead to expect
 
