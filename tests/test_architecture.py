@@ -67,7 +67,6 @@ ALLOWED_STRINGS: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ),
     ("heading", ("viewer/tabs/raw.py",), "the end of a field's name, as track"),
     ("magnetic", ("readers/", "pipeline/verbs/anonymous.py"), "the north of a direction, as true"),
-    ("magnetic", ("methods/fleet/", "results/"), "the magnetometer, whose columns begin so, beside the flux valve"),
     ("landing", ("simulation/",), "the leg behind an approach"),
     ("together", ("tables/sources.py", "chapters/provenance.py"), "the key in the metadata of a log joined of several"),
     ("reference", ("methods/fleet/",), "the check of a parking heading, as runway"),

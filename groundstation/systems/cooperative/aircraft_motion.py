@@ -141,7 +141,8 @@ def _fill_platform(flown: FloatArray, gyro_s: float, F: FloatArray) -> None:
 class Powers(NamedTuple):
     """Terms of the series of steps of dx/dt = F x + w, each up to ``span_s`` long.
 
-    They are those of some epochs. Phi = sum (F h)^k / k!; Q = sum L_k h^(k+1) / (k+1)! with L_0 = diag(q), L_(k+1) = F L_k + L_k F'.
+    They are those of some epochs. Phi = sum (F h)^k / k!; Q = sum L_k h^(k+1) / (k+1)! with L_0 = diag(q),
+    L_(k+1) = F L_k + L_k F'.
     """
 
     first: int  # epoch

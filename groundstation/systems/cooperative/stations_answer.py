@@ -7,7 +7,7 @@ StationVerdict = Literal["fits", "off", "one of several", "left out"]
 
 
 def digits_of(metres: float | None) -> int:
-    """Return the decimals that a length is told with: aircraft are off by metres, robots by centimetres.
+    """Return the decimals of a length: aircraft are off by metres, robots by centimetres.
 
     Examples
     --------
