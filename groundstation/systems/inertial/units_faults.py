@@ -63,7 +63,8 @@ def held_spans(track: UnitTrack, others: Sequence[OnGrid]) -> tuple[Held, ...]:
     """Find the spans in which velocities or all outputs of a unit stand still and others move.
 
     A velocity sticks when it keeps one value for ten seconds or longer while the other tracks change quickly, or where
-    the unit's own noise makes so long a run next to impossible. A unit is frozen when its position stands still, too.
+    they change at all and the unit's own noise makes so long a run next to impossible. A unit is frozen when its
+    position stands still, too.
     """
     found: list[Held] = []
     for axis in range(2):
@@ -71,12 +72,14 @@ def held_spans(track: UnitTrack, others: Sequence[OnGrid]) -> tuple[Held, ...]:
         same = np.concatenate([[False], np.diff(values) == 0.0])
         steps = np.abs(np.diff(values[np.isfinite(values)]))
         finest = float(np.min(steps[steps > ROUNDING], initial=np.inf))
-        least = max(LEAST_MOVED_MPS, RESOLUTIONS * (finest if np.isfinite(finest) else 0.0))
+        finest = finest if np.isfinite(finest) else 0.0
+        least = max(LEAST_MOVED_MPS, RESOLUTIONS * finest)
         for start, end in runs(same):
             span = float(track.time_s[start - 1]), float(track.time_s[end - 1])
             if span[1] - span[0] < LEAST_STUCK_S or _distance_m(others, span) < LEAST_FLOWN_MPS * (span[1] - span[0]):
                 continue
-            if _moves(others, span, axis) > least or _is_impossible(same, start, end):
+            moves = _moves(others, span, axis)
+            if moves > least or (moves > finest and _is_impossible(same, start, end)):
                 found.append(Held(*span, (axis,), False))
     places = np.concatenate([[False], (np.diff(track.latitude_deg) == 0.0) & (np.diff(track.longitude_deg) == 0.0)])
     for start, end in runs(places):

@@ -11,6 +11,8 @@ from groundstation.systems.inertial.study import units_limits as study
 from groundstation.systems.inertial.units import judge_units
 from groundstation.systems.inertial.units_answer import UnitsResult
 from groundstation.systems.inertial.units_chapter import units as chapter
+from groundstation.systems.inertial.units_faults import held_spans
+from groundstation.systems.inertial.units_grid import on_grid
 from groundstation.systems.inertial.units_growth import Noise, growth_of
 from groundstation.systems.inertial.units_limits import limits_of
 from groundstation.systems.inertial.units_log import serials_of
@@ -255,3 +257,21 @@ def test_too_little_is_a_reason() -> None:
 
 
 _ROWS = ("time_s", "latitude_deg", "longitude_deg", "velocity_mps", "heading_deg")
+
+
+def test_a_velocity_that_stands_as_still_in_all_units_is_not_stuck() -> None:
+    """Two units without noise, a straight drive in the middle: what is still there is the vehicle."""
+    time_s = np.arange(600.0)
+    east = np.where((time_s > 300.0) & (time_s < 320.0), 20.0, 20.0 + np.sin(0.3 * time_s))
+    velocity = np.column_stack([0.5 * np.cos(0.2 * time_s), east])
+    first = replace(
+        units(1)[0],
+        time_s=time_s,
+        latitude_deg=50.0 + np.cumsum(velocity[:, 0]) / 111_000.0,
+        longitude_deg=10.0 + np.cumsum(velocity[:, 1]) / 71_000.0,
+        velocity_mps=velocity,
+        heading_deg=None,
+    )
+    moving = replace(first, topic="ins.1", velocity_mps=velocity + 0.05 * np.sin(0.7 * time_s)[:, None])
+    assert not held_spans(first, [on_grid(first, time_s)])
+    assert [one.axes for one in held_spans(first, [on_grid(moving, time_s)])] == [(1,)]
