@@ -97,7 +97,7 @@ def _sentence(answers: Answers) -> str:
     if answer is None:
         return ""
     rows = [row for row in answer.algorithms if row.algorithm == answer.default_algorithm]
-    if not rows or rows[0].two_sigma_r_m is None:
+    if not rows or rows[0].two_sigma_r_session_m is None:
         return ""
     against = "" if rows[0].rms_m is None else f", {rows[0].rms_m:.1f} m RMS against the truth"
     who = f"{len(answer.vehicle_names)} aircraft" if len(answer.vehicle_names) > 1 else answer.vehicle_names[0]
@@ -105,7 +105,8 @@ def _sentence(answers: Answers) -> str:
     if answer.stations is not None:
         doubted = [row.station for row in answer.stations.rows if row.verdict != "fits"]
         doubt += f"; station{'s' if len(doubted) > 1 else ''} in doubt: {', '.join(doubted)}" if doubted else ""
-    return f"{who}, {answer.default_algorithm}: 2 sigma_r {rows[0].two_sigma_r_m:.1f} m at the end{against}{doubt}"
+    sigma = f"2 sigma_r {rows[0].two_sigma_r_session_m:.1f} m over the session"
+    return f"{who}, {answer.default_algorithm}: {sigma}{against}{doubt}"
 
 
 COOPERATIVE = Analysis(

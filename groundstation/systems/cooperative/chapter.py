@@ -158,27 +158,27 @@ def session_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -
             f"Session of {results.metadata['aircraft']}", pairs, NOT_ASSESSABLE, headline, (with_full_stop(why),)
         )
     best, reckoned = trusted(answer), _row(answer, REFERENCE)
-    at_end = f"worst aircraft over the session, as computed; {number(best.two_sigma_r_m, 1, 'm')} at its end"
-    figures = [("2σ_r", number(best.two_sigma_r_session_m, 1, "m"), at_end)]
+    at_end = f"worst aircraft over the session, as computed; {_metres(best.two_sigma_r_m, 'm')} at its end"
+    figures = [("2σ_r", _metres(best.two_sigma_r_session_m, "m"), at_end)]
     if reckoned is not None and reckoned is not best:
         figures.append(
             (
                 "Dead reckoning alone",
-                number(reckoned.two_sigma_r_session_m, 1, "m"),
+                _metres(reckoned.two_sigma_r_session_m, "m"),
                 "2σ_r, worst aircraft over the session, as computed",
             )
         )
     if is_number(best.rms_m):
         limits = f"NEES {number(best.nees, 2)}, 95 % limits {number(best.nees_low, 2)} to {number(best.nees_high, 2)}"
-        figures.append(("RMS error", number(best.rms_m, 1, "m"), limits))
+        figures.append(("RMS error", _metres(best.rms_m, "m"), limits))
         figures.append(("Over the bound", number(best.bound_ratio, 2), "RMS error over that of Cramér and Rao"))
     on_board = _row(answer, answer.links_algorithm)
     if on_board is not None and on_board is not best:
         figures.append(
             (
                 "Knowable on board",
-                number(on_board.two_sigma_r_session_m, 1, "m"),
-                f"2σ_r, {title_of(on_board.algorithm)}; {number(on_board.two_sigma_r_m, 1, 'm')} at the end",
+                _metres(on_board.two_sigma_r_session_m, "m"),
+                f"2σ_r, {title_of(on_board.algorithm)}; {_metres(on_board.two_sigma_r_m, 'm')} at the end",
             )
         )
     if best.messages:
@@ -187,15 +187,15 @@ def session_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -
         f"Session of {names_or_count(answer.vehicle_names)}",
         pairs,
         verdict=state_of(best),
-        headline=f"{title_of(best.algorithm)}: 2σ_r {number(best.two_sigma_r_session_m, 1, 'm')}",
+        headline=f"{title_of(best.algorithm)}: 2σ_r {_metres(best.two_sigma_r_session_m, 'm')}",
         sentences=tuple(text for text in (stations_warning(answer), _reason(answer, best)) if text),
         figures=tuple(figures),
     )
 
 
 def _headline(best: AlgorithmRow) -> str:
-    mark, error = state_of(best), f", RMS {number(best.rms_m, 1, 'm')}" if is_number(best.rms_m) else ""
-    return f"{mark.symbol} {title_of(best.algorithm)} · 2σ_r {number(best.two_sigma_r_session_m, 1, 'm')}{error}"
+    mark, error = state_of(best), f", RMS {_metres(best.rms_m, 'm')}" if is_number(best.rms_m) else ""
+    return f"{mark.symbol} {title_of(best.algorithm)} · 2σ_r {_metres(best.two_sigma_r_session_m, 'm')}{error}"
 
 
 def _row(answer: CooperativeResult, algorithm: str) -> AlgorithmRow | None:
@@ -235,9 +235,9 @@ def _algorithms(answer: CooperativeResult, best: AlgorithmRow) -> Grid:
         rows.append(
             (
                 Mark("good" if row is best else "plain", title_of(row.algorithm)),
-                "refused" if row.refused else number(row.two_sigma_r_session_m, 1),
-                number(row.two_sigma_r_m, 1),
-                number(row.rms_m, 1),
+                "refused" if row.refused else _metres(row.two_sigma_r_session_m),
+                _metres(row.two_sigma_r_m),
+                _metres(row.rms_m),
                 number(row.bound_ratio, 2),
                 number(row.nees, 2) + limits,
                 _no_truth(row) if row.is_consistent is None else _yes_no(row.is_consistent, is_good=True),
@@ -271,6 +271,12 @@ def _no_truth(row: AlgorithmRow) -> Mark:
     return Mark("unknown", "not run" if row.refused else "no truth")
 
 
+def _metres(value: float | None, unit: str = "", *, signed: bool = False) -> str:
+    """Return a length in metres, to the millimetre below one metre: robots, not aircraft."""
+    is_small = value is not None and abs(value) < 1.0
+    return number(value, 3 if is_small else 1, unit, signed=signed)
+
+
 def _yes_no(value: bool, is_good: bool) -> Mark:
     return Mark("good" if value is is_good else "bad", "yes" if value else "no")
 
@@ -279,11 +285,11 @@ def _vehicles(answer: CooperativeResult, best: AlgorithmRow) -> Grid:
     rows = [
         (
             row.vehicle,
-            number(row.sigma_north_m, 1),
-            number(row.sigma_east_m, 1),
-            number(row.two_sigma_r_m, 1),
-            number(row.rms_m, 1),
-            number(row.end_error_m, 1),
+            _metres(row.sigma_north_m),
+            _metres(row.sigma_east_m),
+            _metres(row.two_sigma_r_m),
+            _metres(row.rms_m),
+            _metres(row.end_error_m),
             number(row.nees, 2),
             number(row.clock_m, 1, signed=True),
         )
@@ -324,8 +330,8 @@ def _links(answer: CooperativeResult) -> Grid | None:
             number(row.ranges, 0),
             number(row.used, 0),
             Mark("warn", number(row.gated, 0)) if row.gated else number(row.gated, 0),
-            number(row.residual_mean_m, 1, signed=True),
-            number(row.residual_rms_m, 1),
+            _metres(row.residual_mean_m, signed=True),
+            _metres(row.residual_rms_m),
             number(row.nis, 2),
         )
         for row in ordered[:MOST_LINKS]
