@@ -55,12 +55,14 @@ def respond(problem: Problem, columns: FloatArray) -> Response:
         after = np.asarray(np.linalg.solve(np.eye(size) + P @ A, P))
         P = 0.5 * (after + after.T)
         M = M + P @ U
-        kept.append((A, P.copy(), U))
+        kept.append((P.copy(), U))
     dual, L = np.zeros((size, width)), np.zeros((size, size))
     spread = [np.zeros(noise.shape[1:]) for noise in problem.noise]
     duals = np.empty((problem.knots, size, width))
     for knot in range(problem.knots - 1, -1, -1):
-        A, after, U = kept[knot]
+        after, U = kept[knot]
+        H, part = _dense(problem, knot)
+        A = (H.T * problem.weight[part]) @ H
         both = U + dual
         dual = both - A @ (after @ both)
         duals[knot] = dual
