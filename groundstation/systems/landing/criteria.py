@@ -335,6 +335,6 @@ def _manner(seen: _Seen, touchdown: Touchdown) -> dict[str, _Value]:
         "landing_flap": _Value(flap_value, None, at, logged.sources.get("flap", ""), flap_reason),
         "landing_pitch": _Value(pitch, None, at, logged.pitch.logged_by),
         "landing_bank": _Value(bank, None, at, logged.roll.logged_by, told),
-        "landing_sink": _Value(touchdown.sink_rate_mps, None, at),
+        "landing_sink": _Value(touchdown.sink_rate_mps, touchdown.sink_rate_sigma_mps, at, touchdown.sink_rate_by),
         "landing_load": _Value(touchdown.peak_load_g, None, at),
     }
