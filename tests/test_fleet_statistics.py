@@ -359,6 +359,22 @@ def test_rejected_and_nameless_flights_are_told_and_not_compared() -> None:
     ]
 
 
+def test_flux_valves_are_compared_with_flux_valves_by_what_both_show() -> None:
+    values = np.array([[0.0, 1.0, 2.0, math.nan, math.nan], [0.0, 4.0, 2.0, 0.5, 0.5], [9.0, 9.0, 9.0, 9.0, 9.0]])
+    columns = {name.replace("magnetic", "flux"): mine for name, mine in deviation_columns(values, 0.1).items()}
+    columns["flux_a_deg"][2] = math.nan  # the third has a magnetometer
+    other = deviation_columns(np.array([[math.nan] * 5, [math.nan] * 5, [9.0] * 5]), 0.1)
+    rows = deviations(table(**columns, **other))
+    assert [(row.sensor, row.flight_id, row.others) for row in rows] == [
+        ("magnetic", "F0002", 0),
+        ("flux", "F0000", 1),
+        ("flux", "F0001", 1),
+    ]
+    assert rows[1].difference_rms_deg == rows[2].difference_rms_deg == pytest.approx(3.0 / math.sqrt(2.0))
+    assert rows[1].expected_rms_deg == pytest.approx(math.sqrt(0.02 * (1.0 + 0.5 + 0.5)))
+    assert np.isfinite(rows[1].error_deg(np.array([0.0, 90.0]))).all()
+
+
 def test_columns_that_statistics_read_are_those_that_systems_give() -> None:
     """A table of flights has them even without the system; a name told twice must not drift."""
     given = {column.name: column.kind for column in FLIGHT_COLUMNS}

@@ -476,18 +476,24 @@ def test_ranges_that_contradict_the_stated_sigmas_are_a_warning(
 
 
 def test_a_station_a_little_off_is_named_by_its_ranges() -> None:
-    """Nearer than what the assembly takes for far: then it is the gate that finds it."""
+    """Nearer than what the assembly takes for far: the test of the stations finds it, without that the gate."""
 
-    def named(north_m: float) -> list[str]:
+    def named(north_m: float, *, judges_stations: bool) -> list[tuple[str, str]]:
         session = simulated(SHORT).session
         first = session.points[0]
         x, y, z = first.position_m
         moved = replace(session, points=(replace(first, position_m=(x + north_m, y, z)), *session.points[1:]))
-        found = run_analyses((COOPERATIVE,), moved, SessionKnown(settings={"cooperative": believed(SHORT)}))
-        return [one.place for one in found.findings["cooperative"] if one.code == "cooperative.misplaced_station"]
+        found = run_analyses(
+            (COOPERATIVE,),
+            moved,
+            SessionKnown(settings={"cooperative": believed(SHORT, judges_stations=judges_stations)}),
+        )
+        return [(one.code, one.place) for one in found.findings["cooperative"] if "station" in one.code]
 
-    assert named(0.0) == []
-    assert named(1000.0) == [simulated(SHORT).session.points[0].name]
+    name = simulated(SHORT).session.points[0].name
+    assert named(0.0, judges_stations=True) == named(0.0, judges_stations=False) == []
+    assert named(1000.0, judges_stations=True) == [("cooperative.station_drift", name)]
+    assert named(1000.0, judges_stations=False) == [("cooperative.misplaced_station", name)]
 
 
 def test_run_into_the_same_folder_leaves_the_session_be(out: Path, tmp_path: Path) -> None:

@@ -167,7 +167,7 @@ TOPICS: Mapping[str, tuple[Field, ...]] = MappingProxyType(
             _double("frequency_mhz", "mhz", 0.0, 1_000.0),
             _heading("course_magnetic_deg"),
         ),
-        "discrete": (_flag("weight_on_wheels"),),
+        "discrete": (_flag("weight_on_wheels"), _double("wheel_speed_mps", "mps", -10.0, 200.0)),
         "configuration": (
             _double("flap_deg", "deg", -10.0, 90.0),
             *(_flag(f"gear_{leg}down") for leg in ("", "nose_", "left_", "right_")),

@@ -4,7 +4,7 @@
 """
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -22,6 +22,13 @@ from groundstation.cli.application import (
     tell,
     tell_failures,
 )
+
+if TYPE_CHECKING:
+    from groundstation.base.shipped_toml import TomlFile
+    from groundstation.systems.folder_standard import FolderStandard
+
+# Decision -> what ``--fail-on`` may say for it to be exit 4.
+REACHED_AT = {"fail": ("warn", "fail"), "not enough flights": ("warn",), "not flown": ("warn",)}
 
 
 @app.command(epilog=examples("serve"))
@@ -47,6 +54,11 @@ def acceptance(out: Path, standard: str, output: Path | None, fail_on: FailOnMod
 
     Else 4 where ``fail_on`` is reached: with ``warn`` also where nothing was judged that the standard asks for.
     """
+    from groundstation.pipeline.verbs.folder_standards import standard_of
+
+    own = standard_of(standard)
+    if own is not None:
+        return _held_to(out, own, output, fail_on, quiet=quiet, json=json)
     from groundstation.chapters.acceptance_front import front
     from groundstation.chapters.wording import NARROW_SPACE
     from groundstation.cli.text import as_json, printable
@@ -68,5 +80,32 @@ def acceptance(out: Path, standard: str, output: Path | None, fail_on: FailOnMod
         say(f"error: {flight.flight_id}: {flight.reason}")
     if tell_failures(lacking) or unread:
         return FAILED
-    reached_at = {"fail": ("warn", "fail"), "not enough flights": ("warn",), "not flown": ("warn",)}
-    return LIMIT_REACHED if fail_on in reached_at.get(found.decision, ()) else DONE
+    return LIMIT_REACHED if fail_on in REACHED_AT.get(found.decision, ()) else DONE
+
+
+def _held_to(
+    out: Path,
+    own: "tuple[FolderStandard, TomlFile]",
+    output: Path | None,
+    fail_on: FailOnMode,
+    *,
+    quiet: bool,
+    json: bool,
+) -> int:
+    """Hold the flights of a folder to the standard of a system, with the exit codes of an acceptance."""
+    from groundstation.chapters.wording import NARROW_SPACE
+    from groundstation.cli.text import as_json, printable
+    from groundstation.pipeline.verbs.folder_standards import hold_to
+
+    found = hold_to(out, *own, output)
+    if json:
+        tell(as_json(found.answer.to_dict() | {"written": [str(path) for path in found.written]}))
+    elif not quiet:
+        tell("\n".join(map(printable, (found.line.replace(NARROW_SPACE, " "), *map(str, found.written)))))
+    if found.problem:
+        say(f"warning: {found.problem}")
+    for one in found.unread:
+        say(f"error: {one}")
+    if found.unread:
+        return FAILED
+    return LIMIT_REACHED if fail_on in REACHED_AT.get(found.answer.decision, ()) else DONE

@@ -235,7 +235,7 @@ def report(
         typer.Option(
             "--standard",
             help="Judge the INS of the flights by a standard instead, and write the acceptance: app-g, irig261, or a "
-            "file of limits (TOML).",
+            "file of limits (TOML); fsf-alar or a file of kind landing: the share of unstable approaches.",
             metavar="NAME|FILE",
         ),
     ] = "",
@@ -265,7 +265,7 @@ def report(
 ) -> int | None:
     """Make the reports and the index again from the saved results, without the logs.
 
-    With --standard, write the acceptance of the INS instead.
+    With --standard, write the acceptance of the INS instead, or the share of unstable approaches.
     """
     from groundstation.cli import printing
     from groundstation.cli.text import printable

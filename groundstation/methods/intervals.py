@@ -26,6 +26,29 @@ def share_interval(inside: float, checks: float, confidence: float = 0.95) -> tu
     return low, high
 
 
+def wilson_interval(hits: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Return Wilson's interval of a share; (0, 1) without trials.
+
+    On average over the shares it holds the truth as often as it says, where the exact one holds it more often.
+
+    Source: E. B. Wilson, Journal of the American Statistical Association 22 (1927), 209-212.
+
+    Examples
+    --------
+    >>> [round(bound, 4) for bound in wilson_interval(1, 10)]
+    [0.0179, 0.4042]
+    >>> wilson_interval(0, 0)
+    (0.0, 1.0)
+    """
+    if not trials:
+        return 0.0, 1.0
+    z = float(np.sqrt(chi_square_quantile(confidence, 1.0)))
+    share, extra = hits / trials, z * z / trials
+    middle = (share + 0.5 * extra) / (1.0 + extra)
+    half = z / (1.0 + extra) * float(np.sqrt(share * (1.0 - share) / trials + extra / (4.0 * trials)))
+    return max(middle - half, 0.0), min(middle + half, 1.0)
+
+
 def nees_limits(freedom: int, independent: int, share: float = 0.95) -> tuple[float, float]:
     """Return the limits of the mean of ``independent`` normalised squared errors.
 

@@ -14,6 +14,8 @@ AnswerT = TypeVar("AnswerT", bound=Answer)
 # What statistics and pages of all flights read of the columns that systems give, empty where no system gives them.
 READ_BY_FLEETS: Mapping[str, Kind] = {
     **dict.fromkeys(("verdict", "ins_kind", "magnetic_verdict", "magnetic_method"), "category"),
+    **dict.fromkeys(("flux_verdict", "flux_method", "units_verdict"), "category"),
+    "units_off": "text",
     "verdict_reason": "text",
     "samples": "count",
     **dict.fromkeys(
@@ -21,10 +23,15 @@ READ_BY_FLEETS: Mapping[str, Kind] = {
             *("error_deg", "standard_error_deg", "confidence95_low_deg", "confidence95_high_deg", "correction_deg"),
             *("estimate_sd_deg", "sample_mean_deg", "sample_m2_deg2", "onboard_difference_deg"),
             *("reference_residual_arcmin", "radial_error_rate_fit_nmiph", "forecast_60min_rms_m"),
-            *("magnetic_before_rms_deg", "magnetic_after_rms_deg"),
+            *("magnetic_before_rms_deg", "magnetic_after_rms_deg", "flux_before_rms_deg", "flux_after_rms_deg"),
             *("health_vibration_mps2", "health_hdop", "health_test_ratio"),
             *("onboard_heading_rms_deg", "onboard_tilt_rms_deg"),
-            *(f"magnetic_{letter.lower()}{end}_deg" for letter in LETTERS for end in ("", "_sigma")),
+            *(
+                f"{sensor}_{letter.lower()}{end}_deg"
+                for sensor in ("magnetic", "flux")
+                for letter in LETTERS
+                for end in ("", "_sigma")
+            ),
         ),
         "number",
     ),

@@ -209,7 +209,10 @@ class FleetDeviationRow:
 
     ``coefficients_deg`` A to E are of the error, by the method recommended; ``before_rms_deg`` and ``after_rms_deg`` of
     level flight that no fit has seen. ``difference_rms_deg`` is the RMS over the circle of what the curves differ by,
-    ``expected_rms_deg`` what their sigmas lead to expect of it; None where there is nothing to compare with.
+    ``expected_rms_deg`` what their sigmas lead to expect of it; None where there is nothing to compare with. A
+    coefficient that the headings flown do not show is NaN.
+
+    ``sensor`` is ``magnetic`` of a magnetometer, ``flux`` of a compass of heading alone.
     """
 
     aircraft: str
@@ -224,6 +227,7 @@ class FleetDeviationRow:
     others: int
     difference_rms_deg: float | None
     expected_rms_deg: float | None
+    sensor: str = "magnetic"
 
     def error_deg(self, heading_deg: NDArray[np.float64]) -> NDArray[np.float64]:
         """Evaluate A + B sin c + C cos c + D sin 2c + E cos 2c, shape (n,).
@@ -231,7 +235,7 @@ class FleetDeviationRow:
         c are uncorrected magnetic headings.
         """
         once, twice = np.deg2rad(heading_deg), 2.0 * np.deg2rad(heading_deg)
-        a, b, c, d, e = (self.coefficients_deg[letter] for letter in LETTERS)
+        a, b, c, d, e = np.nan_to_num([self.coefficients_deg[letter] for letter in LETTERS]).tolist()
         return np.asarray(a + b * np.sin(once) + c * np.cos(once) + d * np.sin(twice) + e * np.cos(twice))
 
 

@@ -282,7 +282,10 @@ def _guidance(
 
 
 def _logged_height(recorded: Recorded, distance_m: FloatArray, height_m: FloatArray) -> FloatArray:
-    """Return the barometric height above the threshold, in whole feet; the roll-out follows the runway."""
+    """Return the barometric height above the threshold, in whole feet.
+
+    The roll-out follows the runway.
+    """
     rise_m = np.where(height_m <= 0.0, -recorded.runway_rise * distance_m, 0.0)
     return np.asarray(np.round((height_m * recorded.height_scale + rise_m) / 0.3048) * 0.3048)
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from groundstation.results.fleet_share import SystemShare
     from groundstation.results.flight import FlightResults
     from groundstation.systems.applied import ApplyStep
+    from groundstation.systems.folder_standard import FolderStandard
     from groundstation.systems.joining import JoinStep
     from groundstation.systems.learning import LearnStep
     from groundstation.systems.study import StudyResult
@@ -182,6 +183,8 @@ class System:
         Imports what relates the clocks of several logs for ``run --together``, and returns it.
     learn : callable, optional
         Imports what earlier flights teach later ones of, and returns it; that of the first system that has one.
+    folder_standards : callable
+        Kinds of standards for ``report --standard`` that it judges a folder of flights by.
     """
 
     name: str
@@ -204,6 +207,7 @@ class System:
     learn: "Callable[[], LearnStep] | None" = None
     compared: "Callable[[], tuple[Compared, ...]]" = _none
     notebook_names: Mapping[str, str] = field(default_factory=dict)
+    folder_standards: "Callable[[], tuple[FolderStandard, ...]]" = _none
 
 
 @dataclass(frozen=True)
@@ -331,6 +335,11 @@ class Systems:
     def in_fleet(self) -> tuple[InFleet, ...]:
         """Contributions to the tables of all flights and sessions."""
         return tuple(one.in_fleet() for one in self.every if one.in_fleet is not None)
+
+    @cached_property
+    def folder_standards(self) -> "tuple[FolderStandard, ...]":
+        """Kinds of standards that a folder of flights is judged by."""
+        return tuple(kind for one in self.every for kind in one.folder_standards())
 
     @cached_property
     def compared(self) -> "tuple[Compared, ...]":

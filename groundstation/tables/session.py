@@ -111,11 +111,14 @@ class GroundPoint:
     position_sigma_m : float
         Sigma of that belief along each horizontal axis; 0 for a surveyed point. The navigation controller sets origin
         and axes of the local frame: its error is common to all who range to it.
+    place_deg : tuple of float, optional
+        Latitude and longitude, where the session knows where on the globe it is.
     """
 
     name: str
     position_m: tuple[float, float, float]
     position_sigma_m: float = 0.0
+    place_deg: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

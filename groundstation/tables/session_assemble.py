@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.base.ecef import ecef_m
+from groundstation.base.datums import BY_NAME
+from groundstation.base.ecef import ecef_m, geodetic_deg_m
 from groundstation.base.findings import Finding
 from groundstation.base.local_frame import LocalFrame
 from groundstation.base.records import Int64Array
@@ -237,11 +238,15 @@ def _clock_findings(row: ClockRow, logs: int, agreeing: int) -> list[Finding]:
 
 def _point(stations: Stations, place: int) -> GroundPoint:
     one = stations.stations[place]
-    position = ecef_m(one.latitude_deg, one.longitude_deg, one.altitude_ellipsoid_m)
+    latitude, longitude = one.latitude_deg, one.longitude_deg
+    if stations.datum in BY_NAME:
+        found = geodetic_deg_m(BY_NAME[stations.datum].to_wgs84_m(latitude, longitude, 0.0))
+        latitude, longitude = float(found[0]), float(found[1])
+    position = ecef_m(latitude, longitude, one.altitude_ellipsoid_m)
     if stations.origin is not None:
         position = stations.origin.from_ecef_m(position)
     x, y, z = position.tolist()
-    return GroundPoint(one.name, (x, y, z), one.position_sigma_m)
+    return GroundPoint(one.name, (x, y, z), one.position_sigma_m, (latitude, longitude))
 
 
 def _ranks(flights: Mapping[str, Flight], stations: Stations) -> dict[str, int]:

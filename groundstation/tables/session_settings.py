@@ -4,14 +4,17 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from groundstation.base.datums import BY_NAME
 from groundstation.base.errors import SettingsError
 from groundstation.base.local_frame import LocalFrame
 from groundstation.base.toml_settings import check_ranges, number, required_number
 
+WGS_84 = "WGS-84"
+
 
 @dataclass(frozen=True)
 class Station:
-    """Ground reference point on the WGS-84 ellipsoid.
+    """Ground reference point; on the WGS-84 ellipsoid, unless the file states another datum.
 
     ``position_sigma_m`` holds along each horizontal axis.
     """
@@ -38,13 +41,19 @@ class Stations:
         With it the session is worked in the plane through it (7 states an aircraft), else on the globe (13).
     ranks : mapping of str to int
         Ranks of accuracy of the aircraft, 0 the highest.
+    datum : str
+        Datum of the latitudes and longitudes of the stations: WGS-84, or one of ``base.datums``. Heights are above the
+        ellipsoid of WGS-84 all the same, and the origin is in WGS-84.
     """
 
     stations: tuple[Station, ...] = ()
     origin: LocalFrame | None = None
     ranks: Mapping[str, int] = field(default_factory=dict)
+    datum: str = WGS_84
 
     def __post_init__(self) -> None:
+        if self.datum != WGS_84 and self.datum not in BY_NAME:
+            raise SettingsError("datum", repr(self.datum), f"one of {', '.join((WGS_84, *BY_NAME))}")
         twice = [name for name, count in Counter(one.name for one in self.stations).items() if count > 1]
         if twice:
             raise SettingsError("stations", f"{twice[0]!r} more than once", "names that differ")

@@ -90,6 +90,13 @@ def test_units_signs_and_times(tmp_path: Path) -> None:
         assert words in said
 
 
+def test_gear_of_one_side_and_a_wheel_serve_where_there_is_no_common_one(tmp_path: Path) -> None:
+    parameters = {"Gear (L) On Ground": ramp(1.0, 0.0), "Wheel Speed (L)": ramp(100.0, 0.0, units="kts")}
+    log = Read(write_flightdata(tmp_path / "l.h5", parameters))
+    assert log.values("discrete", "weight_on_wheels")[0] == 1.0
+    assert log.values("discrete.wheel", "wheel_speed_mps")[0] == pytest.approx(100.0 * MPS_PER_KNOT)
+
+
 def test_contract_in_slices(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = plain(tmp_path / "log.hdf5")
     whole = list(registry.read(path))

@@ -373,3 +373,13 @@ def test_deviations_of_the_flights_stand_beside_each_other(tmp_path: Path) -> No
     assert len(fleet.deviations) == flown and changed[0].difference_rms_deg == pytest.approx(5.0 / math.sqrt(2.0))
     assert "3.54" in text
     assert "Magnetic deviation by aircraft" not in page_of(tmp_path, fleet_of(10)).text
+
+
+def test_a_flight_with_an_ins_off_is_remarked_and_counted(tmp_path: Path) -> None:
+    columns = {"units_verdict": ["off", "one_of", "agree", ""], "units_off": ["ins.1", "ins, ins.2", "", ""]}
+    fleet = fleet_of(4, **columns)
+    remarks = flights.remarks_of(fleet)
+    told = [[mark.text for mark in remarks.get(name, ())] for name in fleet.flights["flight_id"].tolist()]
+    assert "ins.1 off" in told[0] and "one of ins, ins.2 off" in told[1]
+    assert not any(text.endswith(" off") for row in told[2:] for text in row)
+    assert "1 flight with an INS off" in page_of(tmp_path, fleet).text

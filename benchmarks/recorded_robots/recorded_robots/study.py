@@ -25,6 +25,7 @@ from groundstation.systems.cooperative.settings import (
     CooperativeSettings,
     InsBelief,
     OdometryBelief,
+    SmootherSettings,
 )
 from groundstation.systems.cooperative.tracks import AlgorithmRun
 from groundstation.systems.study import StudyResult, grid, section, table
@@ -51,6 +52,7 @@ SETTINGS = {
         gate_sigma=4.0,
         latency_slots=0,
         map_window_s=1e6,
+        smoother=SmootherSettings(pair_bias_m=0.03),
     ),
 }
 SETTINGS["miluv"] = CooperativeSettings(
@@ -65,7 +67,12 @@ SETTINGS["miluv"] = CooperativeSettings(
     map_window_s=1e6,
 )
 SETTINGS["murp"] = replace(
-    SETTINGS["miluv"], range_bias_m=0.15, range_bias_s=20.0, correlated_share=0.5, gate_sigma=4.0
+    SETTINGS["miluv"],
+    range_bias_m=0.15,
+    range_bias_s=20.0,
+    correlated_share=0.5,
+    gate_sigma=4.0,
+    smoother=SmootherSettings(pair_bias_m=0.1),
 )
 _SIMULATED = (
     "dead reckoning is simulated, for the data hold none: truth with a start off by 0.1 m along each axis, "
@@ -80,7 +87,7 @@ PROTOCOLS = {
 }
 COLUMNS = (
     *("set", "case", "algorithm", "rms_m", "nees", "worst_vehicle_m", "relative_m"),
-    *("relative_nees", "diverges", "gated_share", "bytes_per_s"),
+    *("relative_nees", "common_m", "common_nees", "diverges", "gated_share", "bytes_per_s"),
 )
 DIGITS = {
     "rms_m": 3,
@@ -88,6 +95,8 @@ DIGITS = {
     "worst_vehicle_m": 3,
     "relative_m": 3,
     "relative_nees": 2,
+    "common_m": 4,
+    "common_nees": 2,
     "gated_share": 4,
     "bytes_per_s": 0,
 }
@@ -133,8 +142,9 @@ class Score:
     """One algorithm on one case, over all draws.
 
     Horizontal RMS error of the team and of its worst vehicle, of the places of two vehicles to one another, mean NEES
-    (2 is honest), that of the place of one vehicle to another where the algorithm claims a covariance of it, whether
-    any run diverges, share of measurements gated, bytes that a vehicle sends in a second.
+    (2 is honest), that of the place of one vehicle to another where the algorithm claims a covariance of it, RMS error
+    and NEES over the time that all truths have in common, whether any run diverges, share of measurements gated, bytes
+    that a vehicle sends in a second.
     """
 
     rms_m: float
@@ -142,6 +152,8 @@ class Score:
     worst_m: float
     relative_m: float
     relative_nees: float
+    common_m: float
+    common_nees: float
     diverges: bool
     gated: float
     bytes_per_s: float
@@ -156,6 +168,8 @@ def score(
     """
     errors: dict[str, list[FloatArray]] = {}
     nees, relative, relative_nees, diverges = [], [], [], False
+    common, common_nees = [], []
+    common_s = min((float(time_s[-1]) for time_s, _ in truth.values()), default=np.inf)
     for run, session, claim in zip(runs, sessions, claims or [{}] * len(runs), strict=True):
         here: dict[int, tuple[FloatArray, FloatArray]] = {}
         for number, (track, vehicle) in enumerate(zip(run.tracks, session.vehicles, strict=True)):
@@ -164,6 +178,8 @@ def score(
                 here[number] = track.time_s, one.error_m
                 errors.setdefault(track.name, []).append((one.error_m**2).sum(axis=1))
                 nees.append(one.nees)
+                common.append((one.error_m**2).sum(axis=1)[track.time_s <= common_s])
+                common_nees.append(one.nees[track.time_s <= common_s])
                 diverges = diverges or one.diverges(track)
         for (i, (time_s, error)), (j, (other_s, other)) in combinations(here.items(), 2):
             both_s, at, to = np.intersect1d(time_s, other_s, return_indices=True)
@@ -183,6 +199,8 @@ def score(
         np.sqrt(max(each, default=np.nan)),
         np.sqrt(_mean(relative)),
         _mean(relative_nees),
+        np.sqrt(_mean(common)),
+        _mean(common_nees),
         diverges,
         gated / max(used + gated, 1),
         sent / max(vehicle_s, 1.0),

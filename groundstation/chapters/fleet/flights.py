@@ -117,6 +117,13 @@ def remarks_of(fleet: FleetResults) -> dict[str, list[Mark]]:
         found.setdefault(str(flight_id), []).append(Mark(tone, text))
 
     flights, trend = fleet.flights, fleet.trend
+    for row in np.flatnonzero(np.isin(flights["units_verdict"], ("off", "one_of"))):
+        is_sure, units = flights["units_verdict"][row] == "off", clean(str(flights["units_off"][row]))
+        note(
+            flights["flight_id"][row],
+            "bad" if is_sure else "warn",
+            f"{units} off" if is_sure else f"one of {units} off",
+        )
     for row in np.flatnonzero(flights["status"] == "failed"):
         note(flights["flight_id"][row], "bad", "failed")
     for row in np.flatnonzero(flights["verdict"] == "reject"):

@@ -75,9 +75,11 @@ def _attention(fleet: FleetResults) -> tuple[Mark, str]:
     flights = fleet.flights
     outliers = len({one.flight_id for one in fleet.outliers})
     rejected = int(np.sum(flights["verdict"] == "reject"))
+    off = int(np.sum(flights["units_verdict"] == "off"))
     failed = sum(one.kind == "failed" for one in fleet.not_in_fleet) + int(np.sum(flights["status"] == "failed"))
     counted = (
         (len(fleet.change_points), "change of level", "changes of level"),
+        (off, "flight with an INS off", "flights with an INS off"),
         *((rejected, "rejected", "rejected"), (outliers, "outlier", "outliers"), (failed, "log failed", "logs failed")),
     )
     told = [plural(*one) for one in counted if one[0]]

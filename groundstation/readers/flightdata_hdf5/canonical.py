@@ -71,7 +71,14 @@ RULES: Mapping[str, tuple[ParameterRule, ...]] = {
         ParameterRule("Airspeed", "indicated_airspeed_mps", "kt"),
         ParameterRule("Airspeed True", "true_airspeed_mps", "kt"),
     ),
-    "discrete": (ParameterRule("Gear On Ground", "weight_on_wheels", "", way="step"),),
+    "discrete": tuple(
+        ParameterRule(name, "weight_on_wheels", "", way="step")
+        for name in ("Gear On Ground", "Gear (L) On Ground", "Gear (R) On Ground")
+    ),
+    "discrete.wheel": tuple(
+        ParameterRule(f"Wheel Speed{which}", "wheel_speed_mps", "kt")
+        for which in ("", " (L)", " (L) (1)", " (R)", " (R) (1)")
+    ),
     "configuration": (
         ParameterRule("Flap", "flap_deg", "deg", way="step"),
         ParameterRule("Flap (L)", "flap_deg", "deg", way="step"),

@@ -76,7 +76,9 @@ def _misplaced(answer: CooperativeResult) -> tuple[Finding, ...]:
     With honest sigmas one range in 10^8 or fewer is beyond a gate of 6 sigma.
     """
     found = []
-    for name in answer.point_names:
+    stations = answer.stations
+    told = {row.station for row in stations.rows if row.verdict != "fits"} if stations else set()
+    for name in (name for name in answer.point_names if name not in told):
         mine = [link for link in answer.links if link.kind == "point" and link.source == name]
         rest = [link for link in answer.links if link not in mine]
         ranges, gated = sum(link.ranges for link in mine), sum(link.gated for link in mine)
@@ -100,6 +102,9 @@ def _sentence(answers: Answers) -> str:
     against = "" if rows[0].rms_m is None else f", {rows[0].rms_m:.1f} m RMS against the truth"
     who = f"{len(answer.vehicle_names)} aircraft" if len(answer.vehicle_names) > 1 else answer.vehicle_names[0]
     doubt = ", sigma too small: the ranges contradict it" if _too_sure(answer) else ""
+    if answer.stations is not None:
+        doubted = [row.station for row in answer.stations.rows if row.verdict != "fits"]
+        doubt += f"; station{'s' if len(doubted) > 1 else ''} in doubt: {', '.join(doubted)}" if doubted else ""
     return f"{who}, {answer.default_algorithm}: 2 sigma_r {rows[0].two_sigma_r_m:.1f} m at the end{against}{doubt}"
 
 

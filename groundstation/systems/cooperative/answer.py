@@ -8,6 +8,7 @@ from typing import ClassVar
 
 from groundstation.results.answer import SessionAnswer
 from groundstation.results.figures import FigureData
+from groundstation.systems.cooperative.stations_answer import StationsAnswer
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,8 @@ class AlgorithmRow:
         Traffic that a data link would carry for this algorithm, mean over slots.
     expected_nees : float or None
         NEES to expect from geometry and stated sigmas alone, worst time, where it was worked out (``pairwise``).
+    two_sigma_r_session_m : float or None
+        Twice the root mean square of the computed sigma_r over the whole session, worst vehicle.
     refused : str
         Why this algorithm was not run; empty where it was. All figures of a refused one are None or 0.
     """
@@ -65,6 +68,7 @@ class AlgorithmRow:
     messages: int
     bytes_per_slot: float
     expected_nees: float | None = None
+    two_sigma_r_session_m: float | None = None
     refused: str = ""
 
 
@@ -139,6 +143,8 @@ class CooperativeResult(SessionAnswer):
     slots : int
     settings : dict
         Every parameter as used.
+    stations : StationsAnswer or None
+        Ground stations as the session judges them; None without any, or where they are not judged.
     figures : tuple of FigureData
         ``cooperative_tracks`` (time_s, vehicle, algorithm, x_m, y_m, z_m in the frame of the session, sigma_north_m,
         sigma_east_m, sigma_up_m, NaN where height is no state, correlation_north_east, two_sigma_r_m, error_m, nees),
@@ -161,4 +167,5 @@ class CooperativeResult(SessionAnswer):
     duration_s: float = 0.0
     slots: int = 0
     settings: dict[str, float | str | bool] = field(default_factory=dict)
+    stations: StationsAnswer | None = None
     figures: tuple[FigureData, ...] = ()

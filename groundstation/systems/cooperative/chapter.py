@@ -23,6 +23,7 @@ from groundstation.results.arrays.session import SessionClocks
 from groundstation.results.fleet import SessionRow
 from groundstation.results.flight import FlightResults
 from groundstation.systems.cooperative.answer import AlgorithmRow, CooperativeResult, LinkRow
+from groundstation.systems.cooperative.stations_chapter import stations_parts, stations_warning
 
 TITLE = "Navigation between aircraft"
 LEAD = (
@@ -38,16 +39,17 @@ TITLES: Mapping[str, str] = {
     "modified": "Ranked, noise of the primaries correlated",
     "split_intersection": "Split covariance intersection",
     "pairwise": "Stored pairwise covariances",
-    "smoothed": "Smoothed: the whole session at once",
+    "smoothed": "Smoothed over the whole session",
 }
 REFERENCE = "dead_reckoning"
 MOST_LINKS = 40
 ALGORITHM_HEADS = (
-    *(Head("Algorithm"), Head("Update"), Head("2σ_r, worst at the end, m", True), Head("RMS error, m", True)),
+    *(Head("Algorithm"), Head("2σ_r, session, m", True), Head("2σ_r, end, m", True), Head("RMS error, m", True)),
     *(Head("RMS over the bound", True), Head("NEES (95 % limits)", True), Head("Consistent"), Head("Diverges")),
 )
 COST_HEADS = (
-    *(Head("Algorithm"), Head("Spectral radius", True), Head("Used", True), Head("Gated", True), Head("Lost", True)),
+    *(Head("Algorithm"), Head("Update"), Head("Spectral radius", True), Head("Used", True), Head("Gated", True)),
+    Head("Lost", True),
     *(Head("Messages", True), Head("Bytes per slot", True)),
 )
 COST_CAPTION = (
@@ -55,7 +57,8 @@ COST_CAPTION = (
     "link would carry for the algorithm."
 )
 ALGORITHM_CAPTION = (
-    "NEES: squared error over its computed variance, 2 is honest; the limits count aircraft, not epochs. Diverges: "
+    "2σ_r of the worst aircraft: over the session (root mean square) and at its end. NEES: squared error over its "
+    "computed variance, 2 is honest; the limits count aircraft, not epochs. Diverges: "
     "error above three computed σ_r at the end. The bound is that of Cramér and Rao for this geometry, from the "
     "readings that the algorithm may use."
 )
@@ -84,9 +87,12 @@ def cooperative(results: FlightResults) -> Section | None:
     if answer is None:
         return without_answer(results, "cooperative", TITLE, LEAD)
     best = trusted(answer)
+    warning = stations_warning(answer)
     parts: list[Part | None] = [
+        Note(warning, "warn") if warning else None,
         _advice(answer, best),
         _algorithms(answer, best),
+        *stations_parts(answer),
         _costs(answer),
         Figure("cooperative.map"),
         _vehicles(answer, best),
@@ -152,13 +158,14 @@ def session_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -
             f"Session of {results.metadata['aircraft']}", pairs, NOT_ASSESSABLE, headline, (with_full_stop(why),)
         )
     best, reckoned = trusted(answer), _row(answer, REFERENCE)
-    figures = [("2σ_r", number(best.two_sigma_r_m, 1, "m"), "worst aircraft at the end, as computed")]
+    at_end = f"worst aircraft over the session, as computed; {number(best.two_sigma_r_m, 1, 'm')} at its end"
+    figures = [("2σ_r", number(best.two_sigma_r_session_m, 1, "m"), at_end)]
     if reckoned is not None and reckoned is not best:
         figures.append(
             (
                 "Dead reckoning alone",
-                number(reckoned.two_sigma_r_m, 1, "m"),
-                "2σ_r, worst aircraft at the end, as computed",
+                number(reckoned.two_sigma_r_session_m, 1, "m"),
+                "2σ_r, worst aircraft over the session, as computed",
             )
         )
     if is_number(best.rms_m):
@@ -168,7 +175,11 @@ def session_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -
     on_board = _row(answer, answer.links_algorithm)
     if on_board is not None and on_board is not best:
         figures.append(
-            ("Knowable on board", number(on_board.two_sigma_r_m, 1, "m"), f"2σ_r, {title_of(on_board.algorithm)}")
+            (
+                "Knowable on board",
+                number(on_board.two_sigma_r_session_m, 1, "m"),
+                f"2σ_r, {title_of(on_board.algorithm)}; {number(on_board.two_sigma_r_m, 1, 'm')} at the end",
+            )
         )
     if best.messages:
         figures.append(("Data link", number(best.bytes_per_slot, 0, "bytes"), "per slot, for this algorithm"))
@@ -176,15 +187,15 @@ def session_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -
         f"Session of {names_or_count(answer.vehicle_names)}",
         pairs,
         verdict=state_of(best),
-        headline=f"{title_of(best.algorithm)}: 2σ_r {number(best.two_sigma_r_m, 1, 'm')}",
-        sentences=(_reason(answer, best),),
+        headline=f"{title_of(best.algorithm)}: 2σ_r {number(best.two_sigma_r_session_m, 1, 'm')}",
+        sentences=tuple(text for text in (stations_warning(answer), _reason(answer, best)) if text),
         figures=tuple(figures),
     )
 
 
 def _headline(best: AlgorithmRow) -> str:
     mark, error = state_of(best), f", RMS {number(best.rms_m, 1, 'm')}" if is_number(best.rms_m) else ""
-    return f"{mark.symbol} {title_of(best.algorithm)} · 2σ_r {number(best.two_sigma_r_m, 1, 'm')}{error}"
+    return f"{mark.symbol} {title_of(best.algorithm)} · 2σ_r {number(best.two_sigma_r_session_m, 1, 'm')}{error}"
 
 
 def _row(answer: CooperativeResult, algorithm: str) -> AlgorithmRow | None:
@@ -224,7 +235,7 @@ def _algorithms(answer: CooperativeResult, best: AlgorithmRow) -> Grid:
         rows.append(
             (
                 Mark("good" if row is best else "plain", title_of(row.algorithm)),
-                "refused" if row.refused else row.update,
+                "refused" if row.refused else number(row.two_sigma_r_session_m, 1),
                 number(row.two_sigma_r_m, 1),
                 number(row.rms_m, 1),
                 number(row.bound_ratio, 2),
@@ -241,6 +252,7 @@ def _costs(answer: CooperativeResult) -> Grid:
     rows = [
         (
             title_of(row.algorithm),
+            row.update,
             number(row.spectral_radius, 3),
             number(row.accepted, 0),
             number(row.gated, 0),

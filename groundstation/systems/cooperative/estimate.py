@@ -1,7 +1,7 @@
 """All algorithms on one session, judged where truth is known: the cooperative answer."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -17,11 +17,13 @@ from groundstation.systems.cooperative.expected_honesty import HonestyCheck, che
 from groundstation.systems.cooperative.geometry import Geometry, Truth, bound_of, geometry_of
 from groundstation.systems.cooperative.loop_types import KINDS, PEER, POINT, USED
 from groundstation.systems.cooperative.settings import ALGORITHMS, CooperativeSettings
+from groundstation.systems.cooperative.stations.rows import station_findings, with_stations_judged
 from groundstation.systems.cooperative.tracks import AlgorithmRun, VehicleTrack
 from groundstation.tables.session import Session
 
 SELDOM_GATED = 0.2
 DEFAULT, KNOWN_ON_BOARD = "smoothed", "centralised"
+MOST_MAPPED = 200  # states of all vehicles whose error map is judged
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,9 @@ def estimate_session(
     """
     prepared = prepare(session, settings)
     require_vehicles(prepared)
+    prepared, stations = with_stations_judged(prepared, settings)
     truth = truth or {}
+    settings, unmapped = _without_costly_map(prepared, settings)
     judged: list[JudgedRun] = []
     checks: dict[str, HonestyCheck] = {}
     for name in algorithms:
@@ -79,7 +83,13 @@ def estimate_session(
     bound = bound_of(prepared.session, settings, truth)
     smoothing_bound = bound_of(prepared.session, settings, truth, DEFAULT) if DEFAULT in algorithms else bound
     geometry = geometry_of(prepared.session, settings, default.run)
-    findings = [*prepared.findings, *_findings(judged, settings), *refusals(checks)]
+    findings = [
+        *prepared.findings,
+        *(station_findings(stations) if stations else ()),
+        *_findings(judged, settings),
+        *refusals(checks),
+        *unmapped,
+    ]
     slots = len(np.unique(prepared.events.slot[np.isin(prepared.events.kind, (PEER, POINT))]))
     last = max(vehicle.last_s for vehicle in prepared.vehicles)
     answer = CooperativeResult(
@@ -102,6 +112,7 @@ def estimate_session(
         duration_s=float(last - min(vehicle.first_s for vehicle in prepared.vehicles)),
         slots=slots,
         settings=_flat(asdict(settings)),
+        stations=stations,
         figures=(
             figures.tracks_figure([(one.run, one.judgements) for one in judged]),
             figures.geometry_figure(geometry, bound),
@@ -111,6 +122,18 @@ def estimate_session(
         ),
     )
     return answer, tuple(findings)
+
+
+def _without_costly_map(prepared: Prepared, settings: CooperativeSettings) -> tuple[CooperativeSettings, list[Finding]]:
+    """Leave out the error map of very many states.
+
+    It judges a filter, and costs more than all of them.
+    """
+    states = sum(vehicle.size for vehicle in prepared.vehicles)
+    if states <= MOST_MAPPED or settings.map_window_s == 0.0:
+        return settings, []
+    text = f"{states} states: the joint error map is left out, which is made for up to {MOST_MAPPED}"
+    return replace(settings, map_window_s=0.0), [Finding("info", "cooperative.no_error_map", text, count=states)]
 
 
 def _reference_tracks(judged: Sequence[JudgedRun]) -> tuple[VehicleTrack, ...]:
@@ -134,6 +157,7 @@ def _judged(prepared: Prepared, run: AlgorithmRun, truth: Truth) -> JudgedRun:
 def _algorithm_row(prepared: Prepared, one: JudgedRun, bound: AlgorithmRun, slots: int) -> AlgorithmRow:
     run = one.run
     ends = [float(track.two_sigma_r_m[-1]) for track in run.tracks if len(track.time_s)]
+    whole = [_mean_square_root(track.two_sigma_r_m.tolist()) for track in run.tracks if len(track.time_s)]
     messages = sum(count for count, _ in run.messages.values())
     total = sum(size for _, size in run.messages.values())
     nees = low = high = ratio = rms = None
@@ -162,6 +186,7 @@ def _algorithm_row(prepared: Prepared, one: JudgedRun, bound: AlgorithmRun, slot
         lost=run.counts.get("lost", 0),
         messages=messages,
         bytes_per_slot=total / slots if slots else 0.0,
+        two_sigma_r_session_m=max(whole, default=None),
     )
 
 
@@ -259,6 +284,9 @@ def _findings(judged: Sequence[JudgedRun], settings: CooperativeSettings) -> lis
         if counts.get("clock_leaps", 0):
             text = f"{name}: a clock leap of a vehicle was assumed {counts['clock_leaps']} times"
             found.append(Finding("warn", "cooperative.clock_reset", text, count=counts["clock_leaps"]))
+        if counts.get("unsettled", 0):
+            text = f"{name}: the last of {settings.smoother.most_passes} passes still moved the answer"
+            found.append(Finding("warn", "cooperative.not_settled", text))
         if counts.get("reopened", 0):
             count = counts["reopened"]
             text = f"{name}: a vehicle was not where it was estimated {count} times; its position was searched again"

@@ -1,8 +1,8 @@
 """Real covariance of the pairwise filter beside the one it claims, without truth.
 
-Stored pairwise cross-covariances are right as long as errors of two vehicles are correlated through one chain of
-encounters. Where encounters are frequent and close loops, or where ground points are heard by some, the factors towards
-third vehicles go wrong and the filter claims less than it makes. Its gains depend on the geometry and on the stated
+Stored pairwise cross-covariances are right where errors of two vehicles are correlated through one chain of encounters.
+Where encounters close loops the factors towards third vehicles go wrong, the more the denser they are, and the filter
+claims less than it makes. Its gains depend on the geometry and on the stated
 sigmas alone, so the covariance that its errors really have under these sigmas can be worked out beside it: the joint
 covariance S of all vehicles and uncertain points goes through the same transitions and gains,
 S = (I - K h) S (I - K h)' + K r K'. The trace of P^-1 S in the plane is the NEES to expect, 2 where P is right.
@@ -183,15 +183,15 @@ def expected_nees(
 def check_pairwise(prepared: Prepared, settings: CooperativeSettings, about: tuple[VehicleTrack, ...]) -> HonestyCheck:
     """Tell from a session itself whether the pairwise filter can be honest in it."""
     limit = settings.pairwise_nees_limit
-    if limit <= 0.0:
-        return HonestyCheck(2.0, "")
+    if limit <= 0.0 or (len(prepared.vehicles) < 3 and not (prepared.points.sigma_m > 0.0).any()):
+        return HonestyCheck(2.0, "")  # two vehicles are one filter, and honest
     found = expected_nees(prepared, settings, about, ENOUGH * limit)
     if found.worst <= limit:
         return HonestyCheck(found.worst, "")
     at_s = float(found.time_s[int(np.argmax(found.nees))])
     reason = (
         f"a NEES of {found.worst:.3g}{'' if found.is_whole else ' or more'} is to be expected at {at_s:.0f} s where 2 "
-        f"is honest (limit {limit:g}), with {_density(prepared)}: it is for sparse encounters that close no loops"
+        f"is honest (limit {limit:g}), with {_density(prepared)}: it is for encounters that close no loops"
     )
     return HonestyCheck(found.worst, reason)
 
@@ -205,7 +205,7 @@ def _density(prepared: Prepared) -> str:
     minutes = max(end_s - start_s, 1.0) / 60.0
     each = int(is_peer.sum()) / max(pairs, 1) / minutes
     loops = max(pairs - len(prepared.vehicles) + 1, 0)
-    text = f"{each:.3g} encounters a minute of each of {pairs} pairs ({loops} loops)"
+    text = f"{each:.3g} encounters a minute of each of {pairs} pairs ({loops} loop{'' if loops == 1 else 's'})"
     others = int((~is_peer).sum())
     return f"{text} and {others} ranges to points or satellites" if others else text
 

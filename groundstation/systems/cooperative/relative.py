@@ -38,6 +38,8 @@ def relative_covariances(prepared: Prepared, settings: CooperativeSettings, run:
     """
     if run.algorithm == "dead_reckoning":
         return _independent(run)
+    if run.algorithm == "smoothed":
+        return dict(run.relative)
     instants = {"centralised": _centralised, "pairwise": _pairwise}.get(run.algorithm)
     found: dict[tuple[int, int], list[tuple[float, FloatArray]]] = {}
     for at_s, pairs in instants(prepared, settings, run) if instants else ():

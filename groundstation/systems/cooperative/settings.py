@@ -13,7 +13,7 @@ ALGORITHMS: dict[str, str] = {
     "ranked": "own states, neighbours of a higher rank with their covariance (multilevel)",
     "modified": "ranked, correlated noise of the primaries",
     "split_intersection": "own states, split covariance intersection",
-    "pairwise": "own states and stored pairwise cross-covariances (Luft et al.)",
+    "pairwise": "own states and stored pairwise cross-covariances (Luft et al.), for encounters without loops",
     "smoothed": "batch least squares over all vehicles and the whole session",
 }
 
@@ -152,6 +152,8 @@ class CooperativeSettings:
     pairwise_nees_limit : float
         ``pairwise`` is refused where geometry and stated sigmas let expect a larger NEES at some time; 2 is honest, 0
         switches the check off.
+    judges_stations : bool
+        Whether ground stations are judged, and those in doubt not relied on; in sessions of aircraft alone.
     """
 
     update: Update = "sequential"
@@ -169,6 +171,7 @@ class CooperativeSettings:
     correlated_share: float = number(0.0, 0.0, 1.0)
     correlation_s: float = number(5.0, 0.01)
     pairwise_nees_limit: float = number(2.5, 0.0)
+    judges_stations: bool = True
     ins: InsBelief = field(default_factory=InsBelief)
     odometry: OdometryBelief = field(default_factory=OdometryBelief)
     camera: CameraBelief = field(default_factory=CameraBelief)

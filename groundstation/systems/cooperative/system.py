@@ -71,6 +71,12 @@ def _g2o() -> "Callable[..., Mapping[str, str]]":
     return g2o_file
 
 
+def _study_stations() -> "Callable[..., StudyResult]":
+    from groundstation.systems.cooperative.study.stations import study_stations
+
+    return study_stations
+
+
 SYSTEM = System(
     name="cooperative",
     session_analyses=(COOPERATIVE,),
@@ -79,6 +85,11 @@ SYSTEM = System(
             "cooperative",
             "navigation between aircraft: published figures with ours beside them, divergence, consistency",
             _study_cooperative,
+        ),
+        Study(
+            "stations",
+            "ground stations: misplaced ones found, false alarms, and what the answer gains",
+            _study_stations,
         ),
     ),
     session_exports=(SessionExport(".tum", _tum), SessionExport(".g2o", _g2o)),

@@ -1,6 +1,7 @@
 """Results of a run: every vehicle's states at the times of output, and counts."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -97,10 +98,12 @@ class AlgorithmRun:
         In the order of the vehicles.
     judged : JudgedMeasurements
     counts : dict
-        ``used``, ``gated``, ``lost``, ``unused``, ``clock_leaps``, ``reopened``.
+        ``used``, ``gated``, ``lost``, ``unused``, ``clock_leaps``, ``reopened``, ``unsettled``.
     messages : dict of vehicle to (messages, bytes)
     map_time_s, map_radius : ndarrays, shape (w,)
         Spectral radius of the joint error map over each window; empty for a centralised filter.
+    relative : dict of (vehicle, vehicle) to (time_s (n,), covariance (n, 2, 2))
+        Covariance of the place of one vehicle to another, north and east, where the algorithm makes it.
     """
 
     algorithm: str
@@ -111,3 +114,4 @@ class AlgorithmRun:
     messages: dict[str, tuple[int, int]]
     map_time_s: FloatArray
     map_radius: FloatArray
+    relative: Mapping[tuple[int, int], tuple[FloatArray, FloatArray]] = field(default_factory=dict)

@@ -12,11 +12,12 @@ from groundstation.results.arrays.typed import MissingColumnError
 from groundstation.results.files import SavedFlight, mapping
 from groundstation.results.fleet_share import to_number
 from groundstation.results.fleet_units import UnitOfFlight
+from groundstation.systems.inertial.alignment_answer import GroundResult
 from groundstation.systems.inertial.answer import InertialResult
 from groundstation.systems.inertial.arrays import InertialStates
-from groundstation.systems.inertial.units_answer import InsUnit, UnitsResult
+from groundstation.systems.inertial.units_answer import InsUnit, Measured, UnitsResult
 from groundstation.systems.inertial.units_limits import limits_of
-from groundstation.systems.inertial.units_log import SERIAL_FROM, serials_of
+from groundstation.systems.inertial.units_log import serials_of
 
 SEEN = 0.5  # observability of a drift that the flight shows
 GRAVITY_MPS2, RADIUS_M = 9.80665, 6_371_000.0
@@ -37,21 +38,10 @@ def units_of(saved: SavedFlight) -> tuple[UnitOfFlight, ...]:
 
 
 def _of_one(saved: SavedFlight, inertial: InertialResult) -> UnitOfFlight:
-    serials = _serials(_said(saved, "ins_serial"))
+    serials = [serial for _, serial in serials_of(_said(saved, "ins_serial"))]
     reason = CHANGES if len(serials) > 1 else _reason(inertial)
     figures = {} if reason else _figures(saved, inertial)
     return UnitOfFlight(inertial.ins_topic, serials[0] if serials else "", reason, **figures)
-
-
-def _serials(text: str) -> tuple[str, ...]:
-    """Return the serials that a text states in order.
-
-    A comma that no time follows is part of a serial.
-    """
-    later = [one.strip() for one in text.split(",")][1:]
-    if all(map(SERIAL_FROM.match, later)):
-        return tuple(serial for _, serial in serials_of(text))
-    return (text,)
 
 
 def _of_several(saved: SavedFlight, units: UnitsResult, unit: InsUnit, inertial: InertialResult | None) -> UnitOfFlight:
@@ -64,7 +54,7 @@ def _of_several(saved: SavedFlight, units: UnitsResult, unit: InsUnit, inertial:
         figures |= _figures(saved, inertial)
     if unit.rate_fit_nmiph is not None:
         figures |= {"rate_nmiph": unit.rate_fit_nmiph.value, "rate_nmiph_half95": unit.rate_fit_nmiph.half95}
-        figures |= _limit(units.ins_class, unit.compared_hours)
+        figures |= _limit(unit.ins_class or units.ins_class, unit.compared_hours)
     return UnitOfFlight(unit.topic, serial, **figures)
 
 
@@ -122,7 +112,15 @@ def _limit(ins_class: str, hours: float | None) -> dict[str, Any]:
 
 
 def _tilt(saved: SavedFlight, inertial: InertialResult) -> dict[str, Any]:
-    """Tilt at the start of navigation by the velocity error of the first Schuler period."""
+    """Tilt at the start of navigation, by the smoother where the flight has it.
+
+    Else by the velocity error of the first Schuler period.
+    """
+    ground = saved.results.answer(GroundResult)
+    if ground is not None and ground.ins_topic == inertial.ins_topic and ground.at_start is not None:
+        north_arcsec, east_arcsec = ground.at_start.tilt_north_arcsec, ground.at_start.tilt_east_arcsec
+        if north_arcsec is not None and east_arcsec is not None:
+            return _length(north_arcsec, east_arcsec)
     try:
         states = saved.rows_of(InertialStates)
     except MissingColumnError:
@@ -135,9 +133,14 @@ def _tilt(saved: SavedFlight, inertial: InertialResult) -> dict[str, Any]:
     (north, east) = found
     if north is None or east is None:
         return {}
-    size = math.hypot(north[0], east[0])
-    sigma = math.hypot(north[0] * north[1], east[0] * east[1]) / size if size > 0.0 else max(north[1], east[1])
-    return {"tilt_arcsec": ARCSEC_PER_RAD * size, "tilt_arcsec_half95": ARCSEC_PER_RAD * NORMAL_95 * sigma}
+    return _length(*(Measured(ARCSEC_PER_RAD * one[0], ARCSEC_PER_RAD * NORMAL_95 * one[1]) for one in (north, east)))
+
+
+def _length(north: Measured, east: Measured) -> dict[str, Any]:
+    """Return the size of a tilt from its parts, with half of its interval."""
+    size = math.hypot(north.value, east.value)
+    half = math.hypot(north.value * north.half95, east.value * east.half95) / size if size > 0.0 else 0.0
+    return {"tilt_arcsec": size, "tilt_arcsec_half95": half or max(north.half95, east.half95)}
 
 
 def tilt_rad(since_s: FloatArray, velocity_mps: FloatArray) -> tuple[float, float] | None:

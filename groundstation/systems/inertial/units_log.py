@@ -129,15 +129,25 @@ def _serial_text(flight: Flight, topic: str, known: Known, *, is_first: bool) ->
 def serials_of(text: str) -> tuple[tuple[float, str], ...]:
     """Return the serials of a unit with the flight second from which each holds.
 
+    A comma that no time follows is part of a serial.
+
     Examples
     --------
     >>> serials_of("A12"), serials_of("A12, B07 from 5400 s")
     (((0.0, 'A12'),), ((0.0, 'A12'), (5400.0, 'B07')))
+    >>> serials_of("HG2001, rev B, B07 from 5400")
+    ((0.0, 'HG2001, rev B'), (5400.0, 'B07'))
     """
     found: list[tuple[float, str]] = []
     for part in filter(None, (one.strip() for one in text.split(","))):
         told = SERIAL_FROM.match(part)
-        found.append((0.0, part) if told is None else (float(told["from_s"]), told["serial"]))
+        if told is not None:
+            found.append((float(told["from_s"]), told["serial"]))
+        elif found:
+            at_s, serial = found[-1]
+            found[-1] = at_s, f"{serial}, {part}"
+        else:
+            found.append((0.0, part))
     ordered = sorted(found, key=lambda one: one[0])
     return tuple(one for before, one in pairwise([(-1.0, ""), *ordered]) if one[1] != before[1])
 

@@ -10,7 +10,7 @@ from groundstation.systems.inertial.units_grid import OnGrid, apart_m
 from groundstation.systems.inertial.units_growth import Noise
 from groundstation.systems.inertial.units_track import UnitTrack
 
-# Seconds over which an error of rounding stays the same, of a position and of a velocity.
+# Seconds over which an error of rounding stays the same, of a position and of a velocity, and noise of a heading.
 POSITION_S, VELOCITY_S, HEADING_S = 60.0, 10.0, 60.0
 SIGMA_OF_MEDIAN = np.sqrt(np.pi / 2.0)  # times that of the mean
 SIGMA_PER_MAD, SECOND_DIFFERENCES = 1.4826, np.sqrt(6.0)
@@ -41,9 +41,9 @@ def heading_apart(first: UnitTrack, second: UnitTrack, grids: tuple[OnGrid, OnGr
         return None
     value = float(np.median(known))
     steps = [0.0 if track.heading_deg is None else _step(track.heading_deg) for track in (first, second)]
-    sigma = max(_rounding(steps), _white(wrap_180(apart - value)[:, None]))
     lasting = 2.0 * HEADING_S / max(float(np.ptp(one.time_s[np.isfinite(apart)])), 1.0)
-    return Measured(value, float(NORMAL_95 * SIGMA_OF_MEDIAN * sigma * np.sqrt(min(lasting, 1.0))))
+    noise = SIGMA_OF_MEDIAN * _white(wrap_180(apart - value)[:, None]) * np.sqrt(min(lasting, 1.0))
+    return Measured(value, float(NORMAL_95 * np.hypot(_rounding(steps), noise)))  # rounding lasts on a straight leg
 
 
 def _step(values: FloatArray, smallest: float = SMALLEST_DEG) -> float:

@@ -33,7 +33,7 @@ WIDTH_M = 45.0
 
 @dataclass(frozen=True, kw_only=True)
 class AlongFamily:
-    """Family of approaches whose error along the course is measured, by what is added to the plain one.
+    """Family of approaches, by the amounts added to the plain one.
 
     Parameters
     ----------

@@ -56,13 +56,14 @@ from groundstation.systems.landing.reference import (
 )
 from groundstation.systems.landing.settings import LIMITS, LandingSettings
 from groundstation.systems.landing.stabilised import rejudge, stabilised
-from groundstation.systems.landing.touchdown import touchdown_of
+from groundstation.systems.landing.touchdown import is_set_down, touchdown_of, with_evidence
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight
 
 SATELLITES = "GPS"  # as recorders name the source of guidance
 TURN_S = 180.0  # before a final, in which it is turned onto the course
+SET_DOWN = "comes down too slowly to roll, as a helicopter does: no touchdown on wheels"
 MOST_ANALYSED = 50  # a log of many circuits takes no longer
 
 
@@ -104,10 +105,10 @@ def _finals(
         Where there is no final.
     """
     path = path_of(flight, settings)
-    ends = ends_of(path, known.phases, settings)
+    ends = tuple(with_evidence(flight, path, end) for end in ends_of(path, known.phases, settings)[:MOST_ANALYSED])
     if not ends:
         raise NotAssessableError("landing", "no landing in the log, and no guided descent followed by a climb")
-    found = [final_of(path, end, known.site, settings, known.runways) for end in ends[:MOST_ANALYSED]]
+    found = [final_of(path, end, known.site, settings, known.runways) for end in ends]
     left_out = tuple(one for one in found if isinstance(one, LeftOutApproach))
     finals = [one for one in found if isinstance(one, Final)]
     if not finals:
@@ -161,7 +162,7 @@ def _approach(
     )
     errors, along = _position_errors(flight, path, final, runway, relative, source, sensitivity, settings)
     protection = protection_along(flight, path.time_s[final.first], final.end.time_s, number)
-    lands = final.end.outcome == "landing"
+    lands = final.end.touches
     touchdown = touchdown_of(flight, path, final, runway, relative, estimated) if lands else None
     checks = stabilised(path, relative, logged, settings)
     criteria = criteria_of(path, final, runway, relative, logged, touchdown, step_m, (errors, along), settings)
@@ -186,6 +187,7 @@ def _approach(
         claim=_claim(errors, runway),
         position_step_m=step_m if any(step_m) else None,
         along_errors=along,
+        touchdown_reason=SET_DOWN if lands and is_set_down(path, final.end) else "",
         height_errors=_height_errors(flight, path, runway, final.end.time_s, settings) if lands else (),
         criteria=criteria,
         score=score_of(checks, criteria, settings),
@@ -310,7 +312,7 @@ def _errors_of(
     table = flight[topic].unique_times()
     time_s = flight.seconds(table.time_ns)
     guided_from_s, guided_until_s = float(path.time_s[guided.start]), float(path.time_s[guided.stop - 1])
-    last_s = end.time_s + (ROLL_OUT_S if end.outcome == "landing" else 0.0)
+    last_s = min(end.time_s + ROLL_OUT_S, end.until_s) if end.touches else end.time_s
     rows = table.valid("latitude_deg", "longitude_deg") & (time_s >= guided_from_s) & (time_s <= last_s)
     table, time_s = table.take(rows), time_s[rows]
     steps = (step_of(flight[topic].values("latitude_deg")),) * 2

@@ -8,72 +8,11 @@ from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
 from groundstation.systems.landing.criteria_answer import Criterion, Place, Score
 from groundstation.systems.landing.runway_answer import RunwayUsed as RunwayUsed
+from groundstation.systems.landing.touchdown_answer import Touchdown
 
-Outcome = Literal["landing", "go-around"]
+Outcome = Literal["landing", "touch-and-go", "go-around"]
 Measured = Literal["measured", "not measured"]
 GLIDE_SLOPE_DOT = 0.12  # a dot is so much of the glide angle (ICAO Annex 10, volume I, 3.1.5.6.2)
-SINK_S = 3.0  # before the touchdown, over which the sink rate is taken
-LAST_SINK_S = 0.5  # the same behind the flare, where the best trajectory shows it
-PEAK_S = 2.0  # about the touchdown, within which the peak load is sought
-
-
-@dataclass(frozen=True, kw_only=True)
-class TouchdownByStates:
-    """Touchdown by states from raw inertial data, at the same time.
-
-    Parameters
-    ----------
-    words : str
-        "by the best trajectory (heading to 0.3 deg)".
-    sink_rate_mps, sink_rate_sigma_mps : float
-        Over the last ``SINK_S`` before it.
-    last_sink_rate_mps : float
-        Over the last ``LAST_SINK_S``: behind the flare.
-    past_threshold_m : float or None
-        Of the antenna along the runway; None where the threshold itself was placed by the touchdown.
-    past_threshold_sigma_m : float
-        Of the position alone; the time of the touchdown has a sigma of its own.
-    """
-
-    words: str
-    sink_rate_mps: float
-    sink_rate_sigma_mps: float
-    last_sink_rate_mps: float
-    past_threshold_m: float | None
-    past_threshold_sigma_m: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Touchdown:
-    """Place, time and manner in which the wheels met the ground.
-
-    Parameters
-    ----------
-    time_s : float
-        Flight time; ``found_by`` says by what, ``time_sigma_s`` how well.
-    past_threshold_m : float or None
-        Along the runway; None where the threshold itself was placed by the touchdown.
-    sink_rate_mps : float or None
-        Over the last ``SINK_S`` before it.
-    peak_load_g : float or None
-        Greatest normal acceleration within ``PEAK_S`` of it.
-    rollout_course_deg : float or None
-        True direction of the line through the positions of the roll-out.
-    by_states : TouchdownByStates or None
-        The same by the best trajectory, where its checks hold.
-    """
-
-    time_s: float
-    time_sigma_s: float
-    found_by: str
-    latitude_deg: float
-    longitude_deg: float
-    past_threshold_m: float | None
-    ground_speed_mps: float | None
-    sink_rate_mps: float | None
-    peak_load_g: float | None
-    rollout_course_deg: float | None
-    by_states: TouchdownByStates | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -321,6 +260,7 @@ class Approach:
     claim: str
     position_step_m: tuple[float, float] | None = None
     height_errors: tuple[HeightError, ...] = ()
+    touchdown_reason: str = ""  # why a landing has no touchdown
     along_errors: tuple[AlongError, ...] = ()
     criteria: tuple[Criterion, ...] = ()
     score: Score | None = None

@@ -3,7 +3,6 @@
 How each was flown, where it touched down, and what shows accuracy.
 """
 
-from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import DOTS_PER_FULL_SCALE
 from groundstation.chapters.chapter import Remedies
 from groundstation.chapters.gates import setting_facts
@@ -36,18 +35,15 @@ from groundstation.chapters.wording import (
 from groundstation.results.flight import FlightResults
 from groundstation.systems.landing.answer import (
     GLIDE_SLOPE_DOT,
-    LAST_SINK_S,
-    PEAK_S,
-    SINK_S,
     Approach,
     HeightError,
     LandingResult,
     PositionError,
     StabilisedAt,
-    TouchdownByStates,
 )
 from groundstation.systems.landing.criteria_chapter import criteria_parts
 from groundstation.systems.landing.runway_chapter import along_facts, along_told, runway_facts
+from groundstation.systems.landing.touchdown_chapter import SINK_TIME, touchdown_parts
 
 LEAD = "How each approach was flown against its runway, and where it touched down."
 SOURCES = (
@@ -60,8 +56,6 @@ TITLE = "Approaches"
 NOT_STABILISED, NOT_MEASURED = "not stabilised", "not measured"
 TONES: dict[str, Tone] = {"stabilised": "good", NOT_STABILISED: "warn", NOT_MEASURED: "unknown"}
 MOST_TOLD = 6
-SINK_TIME = f"over the last {SINK_S:g} s"
-PEAK_TIME = f"within {PEAK_S:g} s, spikes of single samples left out"
 HOW = (
     "How computed: a final leads straight to a touchdown, or follows the guidance down to a height where a climb "
     f"begins. Deviations are converted to metres by the course sector ({DOTS_PER_FULL_SCALE:g} dots to its edge) and "
@@ -98,7 +92,7 @@ def _claim(answer: LandingResult) -> Claim | None:
     """Return the last landing, or the last approach of a flight without one."""
     if not answer.approaches:
         return None
-    landings = [one for one in answer.approaches if one.outcome == "landing"]
+    landings = [one for one in answer.approaches if one.outcome != "go-around"]
     one = (landings or answer.approaches)[-1]
     state = _verdict(one)
     others = len(answer.approaches) - 1
@@ -134,6 +128,7 @@ def _rests_on(at: StabilisedAt) -> str:
 def _figures(one: Approach) -> tuple[tuple[str, str, str], ...]:
     on, down = one.established, one.touchdown
     error = next((row for row in one.position_errors if row.state == "measured"), None)
+    along = next((row for row in one.along_errors if row.state == "measured"), None)
     found = (
         ("Off the course", number(on.lateral_rms_dots, 2, "dot") if on else ABSENT, "RMS while established"),
         ("Off the path", number(on.vertical_rms_dots, 2, "dot") if on else ABSENT, "RMS while established"),
@@ -142,6 +137,11 @@ def _figures(one: Approach) -> tuple[tuple[str, str, str], ...]:
             "Positions across the course",
             number(error.error_m, 0, "m", signed=True) if error else ABSENT,
             f"{error.topic} by the localizer; 95 % {interval(error.confidence95_m, 0, 'm')}" if error else "",
+        ),
+        (
+            "Positions along the course",
+            number(along.error_m, 0, "m", signed=True) if along else ABSENT,
+            f"{along.topic} by the glide path; 95 % {interval(along.confidence95_m, 0, 'm')}" if along else "",
         ),
     )
     return tuple(figure for figure in found if figure[1] != ABSENT)
@@ -208,7 +208,7 @@ def _approach(one: Approach, answer: LandingResult) -> list[Part | None]:
         Figure("landing.runway", of) if one.runway.is_surveyed and one.runway.length_m else None,
         runway_facts(one),
         *criteria_parts(one, answer.settings.get("gate_floor_m")),
-        _touchdown(one),
+        *touchdown_parts(one),
         *(_error(one, error) for error in one.position_errors),
         *(along_facts(one, error) for error in one.along_errors),
         *(_height(one, error) for error in one.height_errors),
@@ -238,38 +238,6 @@ def _accuracy(error: PositionError) -> str:
             f"the course at the threshold (95 % {interval(error.confidence95_m, 0, 'm')}), right positive."
         )
     return f"Error of {error.topic} across the course not measured: {typeset(error.reason)}."
-
-
-def _touchdown(one: Approach) -> Facts | None:
-    down = one.touchdown
-    if down is None:
-        return None
-    pairs = [
-        ("Time", f"{clock(down.time_s)} ± {number(down.time_sigma_s, 1, 's')}", f"by {typeset(down.found_by)}"),
-        ("Place", f"{number(down.latitude_deg, 5, '°')}, {number(down.longitude_deg, 5, '°')}", "as recorded"),
-        ("Beyond the threshold", number(down.past_threshold_m, 0, "m"), typeset(one.runway.place_reason)),
-        ("Ground speed", number(down.ground_speed_mps, 1, "m/s"), ""),
-        ("Sink rate", number(down.sink_rate_mps, 2, "m/s"), SINK_TIME),
-        ("Peak normal acceleration", number(down.peak_load_g, 2, "g"), PEAK_TIME),
-        ("Course of the roll-out", number(down.rollout_course_deg, 1, "°"), "line through its positions, true"),
-        *_by_states(down.by_states),
-    ]
-    return Facts(f"Approach {one.number}: touchdown", tuple(pairs))
-
-
-def _by_states(down: TouchdownByStates | None) -> tuple[tuple[str, str, str], ...]:
-    """Return the touchdown by the best trajectory, set beside what is recorded."""
-    if down is None:
-        return ()
-    sink = f"{number(down.sink_rate_mps, 2)} ± {number(NORMAL_95 * down.sink_rate_sigma_mps, 2, 'm/s')}"
-    told = [
-        ("Sink rate of the trajectory", sink, f"{SINK_TIME}, {down.words}; ±: 95 %"),
-        ("Sink rate behind the flare", number(down.last_sink_rate_mps, 2, "m/s"), f"over the last {LAST_SINK_S:g} s"),
-    ]
-    if down.past_threshold_m is not None:
-        place = f"{number(down.past_threshold_m, 1)} ± {number(NORMAL_95 * down.past_threshold_sigma_m, 1, 'm')}"
-        told.append(("Antenna beyond the threshold", place, f"{down.words}; ±: 95 %, the time taken as exact"))
-    return tuple(told)
 
 
 def _error(one: Approach, error: PositionError) -> Grid | Facts | None:

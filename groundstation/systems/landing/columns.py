@@ -5,13 +5,14 @@ from typing import TypeVar
 
 from groundstation.results.columns import AnswerColumn
 from groundstation.systems.landing.answer import (
+    AlongError,
     Approach,
     Established,
     HeightError,
     LandingResult,
     PositionError,
-    Touchdown,
 )
+from groundstation.systems.landing.touchdown_answer import Touchdown
 
 Value = TypeVar("Value")
 
@@ -33,6 +34,15 @@ def _measured(value: Callable[[PositionError], float | None]) -> Callable[[Landi
 
     def of_approach(one: Approach) -> float | None:
         return next((value(error) for error in one.position_errors if error.state == "measured"), None)
+
+    return _last(of_approach)
+
+
+def _along(value: Callable[[AlongError], float | None]) -> Callable[[LandingResult], float | None]:
+    """Make a column of the first topic whose error along the course the glide path measured."""
+
+    def of_approach(one: Approach) -> float | None:
+        return next((value(error) for error in one.along_errors if error.state == "measured"), None)
 
     return _last(of_approach)
 
@@ -80,6 +90,12 @@ COLUMNS: tuple[AnswerColumn[LandingResult], ...] = (
         lambda landing: sum(one.outcome == "go-around" for one in landing.approaches),
     ),
     AnswerColumn(
+        "landing_runway",
+        "category",
+        "airport and runway of the last approach, by the site file or the table of runways",
+        _last(lambda one: one.runway.name or None),
+    ),
+    AnswerColumn(
         "landing_stabilised",
         "category",
         "the last approach from the lower check height down, by those criteria that the log has",
@@ -117,7 +133,10 @@ COLUMNS: tuple[AnswerColumn[LandingResult], ...] = (
         _flown(lambda flown: flown.vertical_rms_dots),
     ),
     AnswerColumn(
-        "landing_sink_rate_mps", "number", "before the last touchdown", _touchdown(lambda one: one.sink_rate_mps)
+        "landing_sink_rate_mps",
+        "number",
+        "onto the runway over the last second before the last touchdown",
+        _touchdown(lambda one: one.sink_rate_mps),
     ),
     AnswerColumn("landing_peak_load_g", "number", "around it", _touchdown(lambda one: one.peak_load_g)),
     AnswerColumn(
@@ -127,6 +146,13 @@ COLUMNS: tuple[AnswerColumn[LandingResult], ...] = (
         _measured(lambda error: error.error_m),
     ),
     AnswerColumn("landing_position_error_sigma_m", "number", "its sigma", _measured(lambda error: error.sigma_m)),
+    AnswerColumn(
+        "landing_along_error_m",
+        "number",
+        "of the recorded positions along the course of the last approach, by the glide path, forward positive",
+        _along(lambda error: error.error_m),
+    ),
+    AnswerColumn("landing_along_error_sigma_m", "number", "its sigma", _along(lambda error: error.sigma_m)),
     AnswerColumn(
         "landing_height_error_m",
         "number",

@@ -9,7 +9,7 @@ import numpy as np
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import M_PER_FOOT
 from groundstation.results.gates import Gate
-from groundstation.systems.landing.answer import AlongError, PositionError, RunwayUsed, StabilisedAt, Touchdown
+from groundstation.systems.landing.answer import AlongError, PositionError, RunwayUsed, StabilisedAt
 from groundstation.systems.landing.criteria_answer import KINDS, Criterion, CriterionState, Place, Score
 from groundstation.systems.landing.criteria_settings import Limits, is_within
 from groundstation.systems.landing.geometry import RelativeToRunway
@@ -18,6 +18,7 @@ from groundstation.systems.landing.path import FlightPath
 from groundstation.systems.landing.settings import LandingSettings
 from groundstation.systems.landing.stabilised import PERCENT, place_at, rows_below
 from groundstation.systems.landing.sustained import worst_sustained
+from groundstation.systems.landing.touchdown_answer import Touchdown
 
 if TYPE_CHECKING:
     from groundstation.systems.landing.finals import Final
@@ -320,7 +321,8 @@ def _place(seen: _Seen, touchdown: Touchdown) -> dict[str, _Value]:
 def _manner(seen: _Seen, touchdown: Touchdown) -> dict[str, _Value]:
     """Flap, pitch, bank, sink rate and load as the wheels meet the ground."""
     logged, at_s = seen.logged, touchdown.time_s
-    at = Place(at_s, 0.0, None if touchdown.past_threshold_m is None else -touchdown.past_threshold_m)
+    past = touchdown.past_threshold_m
+    at = Place(at_s, 0.0, None if past is None else seen.off.along_m - past)
     flap = logged.flap_deg[int(np.argmin(np.abs(seen.path.time_s - at_s)))]
     flap_value = float(flap) if np.isfinite(flap) and "flap" not in logged.tells else None
     flap_reason = logged.tells.get("flap", "") if np.isfinite(flap) else ""

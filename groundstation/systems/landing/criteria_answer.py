@@ -8,8 +8,7 @@ from typing import Literal, NamedTuple
 CriterionState = Literal["met", "not met", "undecided", "no limit", "not measured", "not logged"]
 Group = Literal["approach", "threshold", "landing"]
 
-_FSF = "FSF ALAR Briefing Note 7.1, recommended element"
-_EASA = "EASA GM2 ORO.AOC.130"
+_FSF, _EASA = "FSF 7.1, element", "GM2:"
 
 
 class CriterionKind(NamedTuple):
@@ -25,38 +24,36 @@ class CriterionKind(NamedTuple):
 KINDS: Mapping[str, CriterionKind] = MappingProxyType(
     {
         "lateral": CriterionKind("course deviation", "dots", "approach", f"{_FSF} 8"),
-        "vertical": CriterionKind("glide path deviation", "dots", "approach", f"{_FSF} 8; {_EASA}: glideslope"),
-        "sink_rate": CriterionKind("sink rate", "m/s", "approach", f"{_FSF} 5; {_EASA}: high rate of descent"),
-        "bank": CriterionKind("bank", "deg", "approach", f"Airbus FOBN; {_EASA}: bank angles"),
-        "speed": CriterionKind("airspeed", "m/s", "approach", f"{_FSF} 3; {_EASA}: approach speeds"),
-        "flap": CriterionKind("landing flap set at", "m", "approach", f"{_FSF} 4; {_EASA}: landing flap"),
+        "vertical": CriterionKind("glide path deviation", "dots", "approach", f"{_FSF} 8; {_EASA} glideslope"),
+        "sink_rate": CriterionKind("sink rate", "m/s", "approach", f"{_FSF} 5; {_EASA} high rate of descent"),
+        "bank": CriterionKind("bank", "deg", "approach", f"Airbus FOBN; {_EASA} bank angles"),
+        "speed": CriterionKind("airspeed", "m/s", "approach", f"{_FSF} 3; {_EASA} approach speeds"),
+        "flap": CriterionKind("landing flap set at", "m", "approach", f"{_FSF} 4; {_EASA} landing flap"),
         "gear": CriterionKind("gear down at", "m", "approach", f"{_FSF} 4"),
-        "thrust": CriterionKind("lowest thrust", "%", "approach", f"{_FSF} 6; {_EASA}: approach power"),
-        "tailwind": CriterionKind("tailwind", "m/s", "approach", "flight manual; Transport Canada AC 525-008"),
+        "thrust": CriterionKind("lowest thrust", "%", "approach", f"{_FSF} 6; {_EASA} approach power"),
+        "tailwind": CriterionKind("tailwind", "m/s", "approach", "flight manual; TC AC 525-008"),
         "crosswind": CriterionKind("crosswind", "m/s", "approach", "flight manual"),
-        "threshold_height": CriterionKind("height over the threshold", "m", "threshold", "FSF ALAR Briefing Note 8.3"),
-        "threshold_speed": CriterionKind(
-            "airspeed over the threshold", "m/s", "threshold", f"{_EASA}: approach speeds"
-        ),
-        "flare": CriterionKind("from 50 ft to the touchdown", "s", "landing", "FSF ALAR Briefing Note 8.3"),
-        "floating": CriterionKind("from 20 ft to the touchdown", "m", "landing", "FSF ALAR Briefing Note 8.3"),
-        "touchdown": CriterionKind("touchdown beyond the threshold", "m", "landing", "FAA glossary: touchdown zone"),
+        "threshold_height": CriterionKind("height over the threshold", "m", "threshold", "FSF 8.3"),
+        "threshold_speed": CriterionKind("airspeed over the threshold", "m/s", "threshold", f"{_EASA} approach speeds"),
+        "flare": CriterionKind("from 50 ft to the touchdown", "s", "landing", "FSF 8.3"),
+        "floating": CriterionKind("from 20 ft to the touchdown", "m", "landing", "FSF 8.3"),
+        "touchdown": CriterionKind("touchdown beyond the threshold", "m", "landing", "FAA glossary, touchdown zone"),
         "aiming_point": CriterionKind(
-            "touchdown beyond the aiming point", "m", "landing", "ICAO Annex 14, volume I, table 5-1"
+            "touchdown beyond the aiming point", "m", "landing", "ICAO Annex 14, I, table 5-1"
         ),
         "runway_remaining": CriterionKind("runway remaining at the touchdown", "m", "landing", "operator"),
         "centre_line": CriterionKind("off the centre line at the touchdown", "m", "landing", "operator"),
-        "landing_flap": CriterionKind("flap at the touchdown", "deg", "landing", f"{_EASA}: landing flap"),
-        "landing_pitch": CriterionKind("pitch at the touchdown", "deg", "landing", f"{_EASA}: landing pitch"),
-        "landing_bank": CriterionKind("bank below 20 ft", "deg", "landing", f"{_EASA}: bank angles"),
+        "landing_flap": CriterionKind("flap at the touchdown", "deg", "landing", f"{_EASA} landing flap"),
+        "landing_pitch": CriterionKind("pitch at the touchdown", "deg", "landing", f"{_EASA} landing pitch"),
+        "landing_bank": CriterionKind("bank below 20 ft", "deg", "landing", f"{_EASA} bank angles"),
         "landing_sink": CriterionKind("sink rate at the touchdown", "m/s", "landing", "operator"),
-        "landing_load": CriterionKind("peak load at the touchdown", "g", "landing", f"{_EASA}: normal acceleration"),
+        "landing_load": CriterionKind("peak load at the touchdown", "g", "landing", f"{_EASA} normal acceleration"),
     }
 )
 REVERSED = "read as its reverse: it says down in flight alone, and not on the wheels"
 EDITIONS = (
-    "FSF ALAR Briefing Note 7.1: Flight Safety Digest, August to November 2000. EASA GM2 ORO.AOC.130: ED Decision "
-    "2025/020/R; it lists events and leaves limits to operator and type. Transport Canada AC 525-008, issue 1 (2004), "
+    "FSF: ALAR Briefing Notes 7.1 and 8.3, Flight Safety Digest, August to November 2000. GM2: EASA GM2 ORO.AOC.130, "
+    "ED Decision 2025/020/R; it lists events and leaves limits to operator and type. TC AC 525-008, issue 1 (2004), "
     "3.0: up to 10 kt no special tests. FAA Pilot/Controller Glossary: the first 3000 ft."
 )
 

@@ -31,11 +31,12 @@ HEADS = (
     Head("Criterion"),
     Head("Value", True),
     Head("Limit", True),
-    Head("Where"),
+    Head("Height; before threshold"),
     Head("Source; remark"),
 )
 GATE_STATES = {"passed": Mark("good", "met"), "failed": Mark("warn", "not met")}
 NO_VALUE = "not in the log"
+SHORT = "FSF 7.1: ALAR Briefing Note 7.1. GM2: EASA GM2 ORO.AOC.130."
 
 
 def criteria_parts(one: Approach, floor_m: float | str | bool | None) -> list[Part | None]:
@@ -64,7 +65,7 @@ def _check(one: Approach, at: StabilisedAt, floor_m: float | str | bool | None) 
             )
         )
     rows += _not_logged(gate.title for gate in at.gates if gate.state == "not_measured" and gate.reason == NO_VALUE)
-    caption = f"The worst value that lasted, from {height} down to {number(floor_m, 0, 'm')}. {_kept(at)}"
+    caption = f"The worst value that lasted, from {height} down to {number(floor_m, 0, 'm')}. {_kept(at)} {SHORT}"
     return Grid(f"Approach {one.number}, from {height} down: {at.verdict}", HEADS, rows, caption)
 
 
@@ -87,7 +88,7 @@ def _rest(one: Approach) -> Grid | None:
             criterion.kind.title[:1].upper() + criterion.kind.title[1:],
             _value(criterion),
             limits_text(criterion),
-            _where(criterion.at),
+            "" if criterion.kind.group == "landing" else _where(criterion.at),
             _told(criterion.kind.source, criterion.reason),
         )
         for criterion in one.criteria
@@ -137,10 +138,10 @@ def limits_text(one: Criterion) -> str:
 def _where(at: Place | None) -> str:
     if at is None:
         return ""
-    height = number(at.height_m, 0, "m up") if at.height_m is not None else ""
+    height = number(at.height_m, 0, "m") if at.height_m is not None else ""
     before = at.before_threshold_m
-    along = "" if before is None else number(abs(before) / 1000.0, 1, "km before" if before >= 0.0 else "km behind")
-    return ", ".join(filter(None, (height, along)))
+    along = "" if before is None else number(before / 1000.0, 1, "km")
+    return "; ".join(filter(None, (height, along)))
 
 
 def _told(source: str, reason: str) -> str:

@@ -10,6 +10,7 @@ from groundstation.base.geodesy import METRES_PER_DEG, north_east_m
 from groundstation.base.runways.table import RunwayTable
 from groundstation.systems.known import Runway, SiteData
 from groundstation.systems.landing.answer import LeftOutApproach, Outcome
+from groundstation.systems.landing.evidence import SLOWEST_MPS, Evidence
 from groundstation.systems.landing.path import FlightPath, on_guidance, step_of
 from groundstation.systems.landing.runway_choice import ChosenRunway, choose_runway, end_of_approach
 from groundstation.systems.landing.settings import LandingSettings
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 CHORD_S, LONGEST_CHORD_S = 12.0, 40.0  # over which a direction is taken
 STEPS_OF_A_CHORD = 12.0  # of the positions, where they are written in coarse ones
 GROUND_M, FLOWN_M = 1.0, 100.0  # of a height that counts from the airfield: on the ground below, in flight above
+PHASES_SIGMA_S = 3.0  # of a touchdown that phases alone show: 5.3 s early on a rising runway, 1.9 s late by a switch
+LONGEST_ROLL_S = 60.0  # of a touch-and-go
 AFTER_S = 60.0  # a landing so soon after the lowest point of a descent belongs to it
 CLIMB_S = 240.0
 NEAR_M = 2_000.0  # from the end, within which the course is taken
@@ -27,12 +30,33 @@ NEAR_M = 2_000.0  # from the end, within which the course is taken
 
 @dataclass(frozen=True)
 class End:
-    """End of an approach: a touchdown or the lowest point before a climb."""
+    """End of an approach: a touchdown or the lowest point before a climb.
+
+    ``until_s`` is when the aircraft flies again, ``evidence`` what shows the touchdown.
+    """
 
     time_s: float
     outcome: Outcome
     found_by: str
     sigma_s: float
+    until_s: float = np.inf
+    evidence: Evidence | None = None
+
+    @property
+    def touches(self) -> bool:
+        """Tell whether the wheels meet the ground."""
+        return self.outcome != "go-around"
+
+    def ground_m(self, altitude_source: str) -> float | None:
+        """Ground at the touchdown as an altitude shows it, by the line through its roll-out.
+
+        None where it has none.
+        """
+        for heights, ground in () if self.evidence is None else self.evidence.heights:
+            if ground is not None and f"{heights.topic}.{heights.kind.field}" == altitude_source:
+                along_m = np.interp([self.time_s], heights.time_s, heights.along_m)
+                return float(ground.height_m(along_m)[0])
+        return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,11 +88,14 @@ def ends_of(path: FlightPath, phases: "Phases", settings: LandingSettings) -> tu
 
 
 def _landings(path: FlightPath, phases: "Phases") -> tuple[End, ...]:
-    found = [
-        End(before.end_s, "landing", phases.method.partition(":")[0], 0.5)
-        for before, after in zip(phases.intervals, phases.intervals[1:], strict=False)
-        if before.phase == "airborne" and after.phase in ("landing roll", "taxi", "standstill")
-    ]
+    method = phases.method.partition(":")[0]
+    found = []
+    for row, before in enumerate(phases.intervals[:-1]):
+        after = phases.intervals[row + 1 :]
+        if before.phase == "airborne" and after[0].phase in ("landing roll", "take-off run", "taxi", "standstill"):
+            again = next((one.start_s for one in after if one.phase == "airborne"), np.inf)
+            outcome: Outcome = "touch-and-go" if _rolls_on(path, before.end_s, again) else "landing"
+            found.append(End(before.end_s, outcome, method, PHASES_SIGMA_S, again))
     if found or not path.is_above_airfield or any(one.phase == "airborne" for one in phases.intervals):
         return tuple(found)
     height = np.where(np.isfinite(path.altitude_m), path.altitude_m, np.inf)
@@ -79,6 +106,13 @@ def _landings(path: FlightPath, phases: "Phases") -> tuple[End, ...]:
             found.append(End(float(path.time_s[row]), "landing", f"{path.altitude_source} below {GROUND_M:g} m", 2.0))
             is_high = False
     return tuple(found)
+
+
+def _rolls_on(path: FlightPath, down_s: float, again_s: float) -> bool:
+    """Tell whether the aircraft flies again without having become slow."""
+    rows = (path.time_s >= down_s) & (path.time_s <= again_s)
+    speed = path.ground_speed_mps[rows]
+    return bool(again_s - down_s <= LONGEST_ROLL_S and speed.size and np.nanmin(speed) > 2.0 * SLOWEST_MPS)
 
 
 def _lowest(path: FlightPath, first: int, last: int, settings: LandingSettings) -> int | None:
@@ -116,7 +150,7 @@ def final_of(
     chosen = None
     if runway is None and table is not None:
         is_guided = _longest_on_guidance(path, earliest, last, settings) is not None
-        lands = end.outcome == "landing"
+        lands = end.touches
         ended = end_of_approach(path, last - 1, rough_deg, settings, lands=lands, is_guided=is_guided)
         chosen = choose_runway(ended, table, settings)
     found = None if chosen is None or chosen.runway is None else chosen.runway.true_course_deg

@@ -54,10 +54,15 @@ def _of(one: Approach) -> list[Finding]:
         north_m, east_m = one.position_step_m
         text = f"{name}: positions are written in steps of {north_m:.0f} m north, {east_m:.0f} m east"
         found.append(Finding("info", "landing.coarse_positions", text, one.position_topic, place))
+    found += _of_touchdown(one, name)
     for error in one.position_errors:
         if error.state == "measured" and error.error_m is not None and error.sigma_m is not None:
             text = f"{name}: {error.topic} is {error.error_m:+.0f} m across the course (sigma {error.sigma_m:.0f} m)"
             found.append(Finding("info", "landing.position_error", text, error.topic, place))
+    for along in one.along_errors:
+        if along.state == "measured" and along.error_m is not None and along.sigma_m is not None:
+            text = f"{name}: {along.topic} is {along.error_m:+.0f} m along the course (sigma {along.sigma_m:.0f} m)"
+            found.append(Finding("info", "landing.along_error", text, along.topic, place))
     for height in one.height_errors:
         if height.state == "measured" and height.error_m is not None and height.sigma_m is not None:
             text = f"{name}: altitude of {height.topic} is off by {height.error_m:+.1f} m on the runway"
@@ -86,3 +91,27 @@ def _runway(one: Approach) -> Iterator[tuple[Severity, str, str]]:
         yield "info", "landing.runway_not_decided", f"runway {likely}: {choice.reason}; {placed}"
     else:
         yield "info", "landing.runway_placed", f"no runway of the table: {choice.reason}; {placed}"
+
+
+def _of_touchdown(one: Approach, name: str) -> list[Finding]:
+    """Findings about the time of a touchdown: witnesses that disagree, or none at all."""
+    down = one.touchdown
+    if down is None:
+        return []
+    place = f"{down.time_s:.1f} s"
+    found = []
+    for witness in down.witnesses:
+        if witness.state == "disagrees" and witness.time_s is not None and witness.sigma_s is not None:
+            off_s = witness.time_s - down.time_s
+            text = f"{name}: {witness.name} shows the touchdown {off_s:+.1f} s off the others"
+            text = f"{text} (sigma {witness.sigma_s:.1f} s)"
+            found.append(Finding("info", "landing.witness_disagrees", text, witness.topic, place))
+    if not any(witness.state == "agrees" for witness in down.witnesses):
+        text = f"{name}: touchdown by {down.found_by} alone, sigma {down.time_sigma_s:.1f} s: no witness is logged"
+        found.append(Finding("info", "landing.touchdown_unwitnessed", text, one.position_topic, place))
+    for second in down.second_contacts:
+        load = "" if second.load_g is None else f" with {second.load_g:.2f} g"
+        later_s = second.time_s - down.time_s
+        text = f"{name}: second contact {later_s:.1f} s after the touchdown{load}: bounce or rebound"
+        found.append(Finding("info", "landing.second_contact", text, one.position_topic, place))
+    return found

@@ -212,8 +212,10 @@ def _threshold(path: FlightPath, final: Final, line: FittedLine, settings: Landi
 def relative_to_runway(path: FlightPath, final: Final, runway: RunwayUsed) -> RelativeToRunway:
     """Compare a final and its roll-out with runway and glide path."""
     last = final.last
-    if final.end.outcome == "landing":
-        rolls = (path.time_s <= final.end.time_s + ROLL_OUT_S) & ~(path.ground_speed_mps < ROLL_OUT_MIN_MPS)
+    if final.end.touches:
+        rolls = (path.time_s <= min(final.end.time_s + ROLL_OUT_S, final.end.until_s)) & ~(
+            path.ground_speed_mps < ROLL_OUT_MIN_MPS
+        )
         behind = np.flatnonzero(~rolls[last:])
         last = last + int(behind[0]) if behind.size else len(path.time_s)
     rows = slice(final.first, last)
@@ -276,7 +278,10 @@ def _height(path: FlightPath, final: Final, runway: RunwayUsed) -> FloatArray:
         return path.altitude_m
     if path.altitude_source.endswith("altitude_msl_m") and runway.elevation_m is not None:
         return path.altitude_m - runway.elevation_m
-    if final.end.outcome != "landing":
+    level_m = final.end.ground_m(path.altitude_source)
+    if level_m is not None:
+        return path.altitude_m - level_m
+    if not final.end.touches:
         return np.full(len(path.time_s), np.nan)
     on_ground = (path.time_s >= final.end.time_s) & (path.time_s <= final.end.time_s + 10.0)
     ground_m = path.altitude_m[on_ground & np.isfinite(path.altitude_m)]

@@ -93,14 +93,14 @@ def along_told(error: AlongError) -> str:
 
 
 def _fits_the_end_better(error: AlongError) -> bool:
-    """Tell whether a threshold at the end of the runway would explain an error that is not in the interval."""
+    """Tell whether an undisplaced threshold would explain an error beyond its sigmas."""
     if error.error_from_end_m is None or error.error_m is None or error.sigma_m is None:
         return False
     return abs(error.error_m) > 2.0 * error.sigma_m and abs(error.error_from_end_m) < abs(error.error_m)
 
 
 def along_facts(one: Approach, error: AlongError) -> Facts | None:
-    """Return the error along the course with the parts of its sigma; None where it is not measured."""
+    """Return the error along the course; None where it is not measured."""
     if error.state != "measured":
         return None
     pairs = [

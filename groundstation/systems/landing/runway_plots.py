@@ -15,7 +15,7 @@ USUAL_WIDTH_M = 45.0  # drawn where none is known
 
 
 def runway_from_above(results: FlightResults, of: str) -> Plot | None:
-    """Return the runway with the positions before, at and behind the touchdown; None without a runway."""
+    """Return the runway with the positions around the touchdown; None without a runway."""
     answer, data = results.answer(LandingResult), results.rows_of(LandingPath)
     one = None if answer is None else next((row for row in answer.approaches if str(row.number) == of), None)
     if one is None or data is None or not one.runway.is_surveyed or not one.runway.length_m:

@@ -10,6 +10,7 @@ from groundstation.systems.system import Study, System, Tab
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Adviser, Chapter
     from groundstation.plots.plot import Describe
+    from groundstation.systems.folder_standard import FolderStandard
     from groundstation.systems.study import StudyResult
 
 
@@ -68,10 +69,35 @@ def _study_along() -> "Callable[..., StudyResult]":
     return study_along
 
 
+def _study_criteria() -> "Callable[..., StudyResult]":
+    from groundstation.systems.landing.criteria_study import study_criteria
+
+    return study_criteria
+
+
+def _folder_standards() -> "tuple[FolderStandard, ...]":
+    from groundstation.systems.folder_standard import FolderStandard
+    from groundstation.systems.landing.unstable import KIND, SHIPPED, judge
+    from groundstation.systems.landing.unstable_chapter import document
+
+    return (FolderStandard(KIND, SHIPPED, judge, document),)
+
+
+def _study_touchdown() -> "Callable[..., StudyResult]":
+    from groundstation.systems.landing.touchdown_study import study_touchdown
+
+    return study_touchdown
+
+
 SYSTEM = System(
     name="landing",
     analyses=(LANDING, LANDING_BEACONS),
     studies=(
+        Study(
+            "criteria",
+            "criteria of approaches: verdicts on flap, gear, speed and wind against what was flown",
+            _study_criteria,
+        ),
         Study(
             "approach",
             "recorded approaches: the localizer as a reference for positions, how honest its interval is",
@@ -81,10 +107,12 @@ SYSTEM = System(
         Study(
             "runways", "choice of the runway from the table: how often one is named, and the right one", _study_runways
         ),
+        Study("touchdown", "touchdowns: time by all that shows it, and how honest its interval is", _study_touchdown),
     ),
     chapters=_chapters,
     plots=_plots,
     tabs=_tabs,
     advice=_advice,
+    folder_standards=_folder_standards,
     notebook_names={"landing_beacons.deviations": "landing-beacons"},
 )

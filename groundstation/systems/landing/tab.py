@@ -83,7 +83,7 @@ def _on_the_map(recorder: Recorder, one: Approach) -> None:
 
 
 def _outline(runway: RunwayUsed) -> FloatArray:
-    """Return the corners of a runway, forward and right of the threshold, with a bar at the threshold."""
+    """Return the corners of a runway, forward and right, with a bar at the threshold."""
     half_m = 0.5 * (runway.width_m or USUAL_WIDTH_M)
     first = -(runway.displaced_m or 0.0)
     last = first + (runway.length_m or 0.0)

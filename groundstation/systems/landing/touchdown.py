@@ -1,32 +1,50 @@
-"""Touchdown: where, how fast, how hard."""
+"""Touchdown: when, where, how fast, how hard."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from groundstation.base.angles import wrap_180
 from groundstation.base.geodesy import continuous_longitude_deg
-from groundstation.base.signals import topics_of_kind
-from groundstation.base.units import MPS2_PER_G
 from groundstation.results.roles import StatesAlongTheFlight
-from groundstation.systems.landing.answer import (
+from groundstation.systems.landing.answer import RunwayUsed
+from groundstation.systems.landing.evidence import SLOWEST_MPS, Evidence, evidence_of
+from groundstation.systems.landing.finals import End, Final
+from groundstation.systems.landing.geometry import RelativeToRunway, along_and_across, line_through
+from groundstation.systems.landing.ground import Ground
+from groundstation.systems.landing.path import FlightPath
+from groundstation.systems.landing.second_contact import second_contacts
+from groundstation.systems.landing.sink import SinkRate, rate_before, sink_rate_of
+from groundstation.systems.landing.touchdown_answer import (
     LAST_SINK_S,
     PEAK_S,
     SINK_S,
-    RunwayUsed,
     Touchdown,
     TouchdownByStates,
 )
-from groundstation.systems.landing.finals import Final
-from groundstation.systems.landing.geometry import RelativeToRunway, along_and_across, line_through
-from groundstation.systems.landing.path import FlightPath, slope
+from groundstation.systems.landing.witnesses import load_of
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight
 
-LOAD_RANGE_G = (-1.0, 4.0)  # beyond it a sample is a fault of the recorder
-SPIKE_G = 1.5  # of one sample against both its neighbours
-STEPS = 61  # at which the sink rate of states is taken, every 0.05 s
+STEPS = 61  # at which the sink rate of states is taken
+
+
+def with_evidence(flight: "Flight", path: FlightPath, end: End) -> End:
+    """Return an end at the time that its witnesses show; as it was where there are none."""
+    if not end.touches:
+        return end
+    evidence = evidence_of(flight, path, end.time_s, end.until_s)
+    if evidence is None:
+        return end
+    return replace(end, time_s=evidence.time_s, sigma_s=evidence.sigma_s, found_by=evidence.found_by, evidence=evidence)
+
+
+def is_set_down(path: FlightPath, end: End) -> bool:
+    """Tell whether the aircraft comes down too slowly to roll: a helicopter, a multicopter."""
+    speed_mps = float(np.interp(end.time_s, path.time_s, path.ground_speed_mps))
+    return bool(speed_mps < SLOWEST_MPS)
 
 
 def touchdown_of(
@@ -36,12 +54,14 @@ def touchdown_of(
     runway: RunwayUsed,
     relative: RelativeToRunway,
     estimated: StatesAlongTheFlight | None = None,
-) -> Touchdown:
-    """Measure the touchdown that a final ends in.
+) -> Touchdown | None:
+    """Measure the touchdown that a final ends in; None where nothing rolls.
 
     It is also told by the states of an estimate whose checks hold.
     """
-    at_s = final.end.time_s
+    if is_set_down(path, final.end):
+        return None
+    at_s, evidence = final.end.time_s, final.end.evidence
     places = path.latitude_deg, continuous_longitude_deg(path.longitude_deg)
     latitude, longitude = (float(np.interp(at_s, path.time_s, one)) for one in places)
     longitude = longitude if abs(longitude) <= 180.0 else float(wrap_180(longitude))
@@ -51,17 +71,27 @@ def touchdown_of(
     if len(on_ground) >= 3 and np.isfinite(path.ground_speed_mps[on_ground]).any():
         course = line_through(path, slice(int(on_ground[0]), int(on_ground[-1]) + 1)).course_deg
     speed_mps = float(np.interp(at_s, path.time_s, path.ground_speed_mps))
+    speed = speed_mps if np.isfinite(speed_mps) else None
+    sink, ground = _sink_rate(path, at_s, evidence), None if evidence is None else _surest_ground(evidence)
     return Touchdown(
         time_s=at_s,
         time_sigma_s=final.end.sigma_s,
         found_by=final.end.found_by,
+        confidence95_s=None if evidence is None else evidence.confidence95_s,
         latitude_deg=latitude,
         longitude_deg=longitude,
         past_threshold_m=-float(distance_m[0]) if runway.is_surveyed else None,
-        ground_speed_mps=speed_mps if np.isfinite(speed_mps) else None,
-        sink_rate_mps=_sink_rate(flight, path, at_s),
+        place_sigma_m=None if speed is None else speed * final.end.sigma_s,
+        ground_speed_mps=speed,
+        sink_rate_mps=None if sink is None else sink.rate_mps,
+        sink_rate_sigma_mps=None if sink is None else sink.sigma_mps,
+        sink_rate_by="" if sink is None else sink.topic,
+        runway_slope=None if ground is None else ground.slope,
+        runway_slope_sigma=None if ground is None else ground.slope_sigma,
         peak_load_g=_peak_load(flight, at_s),
         rollout_course_deg=course,
+        witnesses=() if evidence is None else evidence.witnesses,
+        second_contacts=() if evidence is None else second_contacts(evidence),
         by_states=None if estimated is None else _by_states(estimated, runway, at_s),
     )
 
@@ -87,39 +117,19 @@ def _by_states(estimated: StatesAlongTheFlight, runway: RunwayUsed, at_s: float)
     )
 
 
-def _sink_rate(flight: "Flight", path: FlightPath, at_s: float) -> float | None:
-    """Return the sink rate before a touchdown.
-
-    The radio altimeter shows it where there is one, else by the source of the height.
-    """
-    for topic in topics_of_kind("radio_altimeter", flight.topics()):
-        rate = _rate_before(flight.time_s(topic), flight[topic].values("height_m"), at_s)
-        if rate is not None:
-            return -rate
-    rate = _rate_before(path.time_s, path.altitude_m, at_s)
-    return None if rate is None else -rate
+def _sink_rate(path: FlightPath, at_s: float, evidence: Evidence | None) -> SinkRate | None:
+    """Sink rate by the surest source of the evidence, else by the height of the approach."""
+    found = None if evidence is None else sink_rate_of(evidence)
+    return found if found is not None else rate_before(path.time_s, path.altitude_m, at_s, path.altitude_source)
 
 
-def _rate_before(time_s: np.ndarray, height_m: np.ndarray, at_s: float) -> float | None:
-    window = (time_s >= at_s - SINK_S - 1.0) & (time_s <= at_s) & np.isfinite(height_m)
-    if window.sum() < 2:
-        return None
-    rate = slope(time_s[window], height_m[window], 2.0 * SINK_S)[-1]
-    return float(rate) if np.isfinite(rate) else None
+def _surest_ground(evidence: Evidence) -> Ground | None:
+    """Ground of an altitude, which shows the slope; a height above the ground does not."""
+    found = [ground for heights, ground in evidence.heights if ground and not heights.kind.counts_from_ground]
+    return min(found, key=lambda one: one.slope_sigma, default=None)
 
 
 def _peak_load(flight: "Flight", at_s: float) -> float | None:
     """Greatest normal acceleration around a touchdown, spikes of single samples left out."""
-    for topic in topics_of_kind("ins", flight.topics()):
-        if not flight[topic].has("accel_z_mps2"):
-            continue
-        time_s = flight.time_s(topic)
-        load_g = -flight[topic].values("accel_z_mps2") / MPS2_PER_G
-        window = (np.abs(time_s - at_s) <= PEAK_S) & (load_g > LOAD_RANGE_G[0]) & (load_g < LOAD_RANGE_G[1])
-        load_g = load_g[window]
-        if len(load_g) < 3:
-            continue
-        middle = load_g[1:-1]
-        is_spike = np.minimum(np.abs(middle - load_g[:-2]), np.abs(middle - load_g[2:])) > SPIKE_G
-        return float(np.max(middle[~is_spike])) if (~is_spike).any() else None
-    return None
+    load = load_of(flight, at_s - PEAK_S, at_s + PEAK_S)
+    return None if load is None or not len(load.load_g) else float(np.max(load.load_g))

@@ -11,7 +11,7 @@ from groundstation.results.rules import Rejudged
 from groundstation.systems.analysis import Analysis, Found, Rules, Shortfall, main_numbers
 from groundstation.systems.known import Known
 from groundstation.systems.magnetic.answer import MagneticResult
-from groundstation.systems.magnetic.columns import COLUMNS
+from groundstation.systems.magnetic.columns import COLUMNS, FLUX_COLUMNS
 from groundstation.systems.magnetic.flux_answer import FluxDeviation
 from groundstation.systems.magnetic.flux_settings import FLUX_LIMITS, MagneticFluxSettings
 from groundstation.systems.magnetic.ground_answer import GroundDeviation
@@ -222,6 +222,7 @@ MAGNETIC_FLUX = Analysis(
     applies=_has_magnetic_heading,
     is_expected=_has_magnetic_heading,
     sentence=_flux_sentence,
+    columns=FLUX_COLUMNS,
     examine=_examine_flux,
     rules=Rules(FLUX_LIMITS, _rejudge_flux),
     is_main=main_numbers("verdict"),

@@ -74,7 +74,6 @@ CONDITIONS: dict[ConditionName, str] = {
 }
 REMEDIES: Remedies = (
     ("no turn of steady bank", ("Fly", "a full circle to either side at equal bank")),
-    ("no three-axis magnetometer", ("Record", "a three-axis magnetometer")),
     ("trusts_aided_heading", ("Check", "where the INS heading comes from (setting trusts_aided_heading)")),
 )
 

@@ -7,10 +7,12 @@ from groundstation.results.fleet import FleetDeviationRow, FleetResults
 from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.answer import ADVISORY, METHOD_TITLES
 from groundstation.systems.magnetic.chapter import TONES
+from groundstation.systems.magnetic.flux_answer import FLUX_TITLES
 
 TITLE = "Magnetic deviation by aircraft"
-LEAD = "What each flight found with its figure-eight: does the deviation of an aircraft stay the same?"
-METHODS = {str(name): title for name, title in METHOD_TITLES.items()}
+LEAD = "What each flight found with its figure-eight or its legs: does the deviation of an aircraft stay the same?"
+SENSORS = {"magnetic": "magnetometer", "flux": "heading alone"}
+METHODS = {str(name): title for name, title in (*METHOD_TITLES.items(), *FLUX_TITLES.items())}
 CHANGED = 3.0  # times what the sigmas lead to expect
 
 
@@ -29,15 +31,16 @@ def usable(fleet: FleetResults) -> list[FleetDeviationRow]:
 
 def _table(rows: tuple[FleetDeviationRow, ...]) -> Grid:
     heads = (
-        *(Head("Aircraft"), Head("Flight"), Head("Verdict"), Head("Method")),
+        *(Head("Aircraft"), Head("Flight"), Head("Sensor"), Head("Verdict"), Head("Method")),
         *(Head(f"{letter}, °", True) for letter in LETTERS),
         *(Head("After, °", True), Head("Others", True), Head("Differs, °", True), Head("Expected, °", True)),
     )
     caption = (
         "Error = A + B sin c + C cos c + D sin 2c + E cos 2c, c the uncorrected magnetic heading. After: RMS in level "
-        "flight that no fit used, after correction. Differs: RMS over the circle of the difference from the mean of "
-        "the aircraft's other flights; expected: from the standard deviations if nothing changed; marked where it is "
-        f"more than {CHANGED:g} times that. {ADVISORY}"
+        "flight that no fit used, after correction; of a compass of heading alone, on legs by the other directions. "
+        "Differs: RMS over the circle of the difference from the mean of the aircraft's other flights with that "
+        "sensor; expected: from the standard deviations if nothing changed; marked where it is more than "
+        f"{CHANGED:g} times that. {ADVISORY}"
     )
     return Grid("Deviation of every flight", heads, [_cells(row) for row in rows], caption)
 
@@ -49,6 +52,7 @@ def _cells(row: FleetDeviationRow) -> tuple[Cell, ...]:
     return (
         aircraft_name(row.aircraft),
         row.flight_id,
+        SENSORS.get(row.sensor, row.sensor),
         Mark(TONES.get(row.verdict, "unknown"), row.verdict),
         METHODS.get(row.method, row.method),
         *(bounded(row.coefficients_deg[letter], 2, signed=True) for letter in LETTERS),

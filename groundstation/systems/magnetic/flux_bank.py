@@ -21,7 +21,7 @@ LAGS_S = np.array([0.0, 1.0, 2.0, 4.0, 8.0, 15.0, 25.0, 40.0, 60.0, 85.0, 120.0,
 CHI_SQUARE_95 = 3.84
 LEAST_WEIGHT = 0.02
 WIDEST_LEAN = 0.8  # of the interval, beyond which the turns do not tell
-LEAST_TURN_S, LEAST_TURNS, LEAST_TURNS_BY_WIND = 10.0, 3, 5
+LEAST_TURN_S, LEAST_TURNS = 10.0, 1
 LAGGING_S = 5.0  # from which on the display is a gyro
 CIRCLE_DEG = np.arange(0.0, 360.0, 1.0)
 BANKS_DEG = np.arange(0.5, 45.01, 0.5)
@@ -89,8 +89,6 @@ def fit_bank(
     error_deg: FloatArray,
     slow_sigma_deg: float,
     settings: MagneticFluxSettings,
-    *,
-    is_by_wind: bool = False,
 ) -> tuple[BankError, tuple[LagCell, ...]]:
     """Fit lean and lag to the errors in flight, (n,), NaN where the true heading is not known.
 
@@ -103,10 +101,8 @@ def fit_bank(
     turning = usable & (np.abs(epochs.lean_deg) >= settings.turn_bank_min_deg)
     turns = [one for one in runs(turning) if epochs.time_s[one[1] - 1] - epochs.time_s[one[0]] >= LEAST_TURN_S]
     upright = _upright(epochs)
-    least = LEAST_TURNS_BY_WIND if is_by_wind else LEAST_TURNS
-    if np.count_nonzero(turning) < settings.turn_samples_min or len(turns) < least:
-        what = "where the wind is solved" if is_by_wind else "with a true heading"
-        reason = f"{len(turns)} turns above {settings.turn_bank_min_deg:g} deg of bank, {least} needed {what}"
+    if np.count_nonzero(turning) < settings.turn_samples_min or len(turns) < LEAST_TURNS:
+        reason = f"no turn above {settings.turn_bank_min_deg:g} deg of bank with a true heading"
         return BankError("not observable", reason, len(turns)), (upright,)
     magnetic = epochs.heading_deg - np.where(np.isfinite(error_deg), error_deg, 0.0)
     per_tilt = np.where(np.isfinite(epochs.per_tilt), epochs.per_tilt, 0.0)

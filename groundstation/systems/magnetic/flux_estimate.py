@@ -131,7 +131,7 @@ def estimate_flux_deviation(
     level = math.hypot(epochs.used.sigma_deg, known.common_sigma_deg)  # that all errors share
     error = wrap_180(epochs.heading_deg + epochs.declination_deg - known.true_deg)
     name = known.references[0].name
-    bank, cells = fit_bank(epochs, error, SLOW_SIGMA_DEG[name], settings, is_by_wind=name == "wind")
+    bank, cells = fit_bank(epochs, error, SLOW_SIGMA_DEG[name], settings)
     step = step_of(flight[topic], "magnetic_heading_deg")
     values = leg_values(epochs, legs, known, error, step, settings)
     turns = by_opposite_turns(epochs, known.true_deg, bank, cells, level, settings, magnetic)
@@ -169,6 +169,7 @@ def _answer(
             "left": chosen.residual.after if chosen.residual else None,
             "dip": None if epochs.dip_deg is None else abs(epochs.dip_deg),
         },
+        bank,
         settings,
     )
     verdict, reason = decide(gates)

@@ -46,9 +46,10 @@ class MagneticFluxSettings:
     known_share: float = number(0.35, 0.01, 1.0)
 
     # Bank error and opposite turns.
-    turn_bank_min_deg: float = number(8.0, 1.0, 80.0)
+    turn_bank_min_deg: float = number(3.0, 1.0, 80.0)
     fit_bank_max_deg: float = number(35.0, 2.0, 60.0)
-    turn_samples_min: int = number(30, 5, 100_000)
+    turn_samples_min: int = number(20, 5, 100_000)
+    may_be_slaved: bool = True  # false: the reading is stated to be the valve's own, not that of a gyro it corrects
     use_error_max_deg: float = number(2.0, 0.1, 45.0)  # of the heading in use: bounds bank and time after a turn
     turns_bias_max_deg: float = number(0.3, 0.0, 45.0)  # that bank and lag leave in the mean of opposite turns
 

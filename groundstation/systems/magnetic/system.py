@@ -47,9 +47,10 @@ def _fleet_plots() -> "Mapping[str, Describe]":
 
 def _advice() -> "Adviser":
     from groundstation.chapters.chapter import Adviser
+    from groundstation.systems.magnetic import flux_advice_chapter
     from groundstation.systems.magnetic.chapter import REMEDIES
 
-    return Adviser(REMEDIES)
+    return Adviser((*REMEDIES, *flux_advice_chapter.REMEDIES), flux_advice_chapter.advise)
 
 
 def _plots() -> "Mapping[str, Describe]":

@@ -4,13 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from groundstation.systems.cooperative.plain.observation import rows_of
-from groundstation.systems.cooperative.plain.steps import MeasurementEvent
 
-from groundstation.base.compile import Loop
 from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_scenario import SessionScenario
 from groundstation.systems.cooperative.events import Prepared, prepare
+from groundstation.systems.cooperative.filters.observation import rows_of
+from groundstation.systems.cooperative.filters.steps import MeasurementEvent
 from groundstation.systems.cooperative.loop_types import HEIGHT, PEER, POINT
 from groundstation.systems.cooperative.settings import (
     CameraBelief,
@@ -30,12 +29,6 @@ from tests.systems.cooperative.example import GLOBAL, LOCAL, believed, full_nees
 SEEDS = range(9100, 9124)  # written down before the first run
 ROUNDING_M = 1e-4  # positions of 6e6 m, and dynamics of a global frame averaged over a knot
 NEES_LIMITS_7 = (4.9, 9.4)  # chi-square of 7 degrees of freedom, mean over 24 sessions: 99.8 % within
-
-
-@pytest.fixture
-def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Loops that are to be compiled run as they are written."""
-    monkeypatch.setattr(Loop, "__call__", lambda loop, *arguments: loop.py_func(*arguments))
 
 
 def put(prepared: Prepared, settings: CooperativeSettings) -> tuple[Layout, Knots]:
@@ -84,7 +77,7 @@ def some_states(prepared: Prepared, layout: Layout, knots: Knots) -> np.ndarray:
 
 
 @pytest.mark.parametrize("what", ["local", "global", "robots"])
-def test_motion_is_that_of_the_filters(interpreted: None, what: str) -> None:
+def test_motion_is_that_of_the_filters(what: str) -> None:
     prepared, settings = robots() if what == "robots" else flown(LOCAL if what == "local" else GLOBAL)
     layout, knots = put(prepared, settings)
     x = some_states(prepared, layout, knots)
@@ -103,7 +96,7 @@ def test_motion_is_that_of_the_filters(interpreted: None, what: str) -> None:
 
 
 @pytest.mark.parametrize("what", ["local", "global", "robots"])
-def test_rows_are_those_of_the_filters(interpreted: None, what: str) -> None:
+def test_rows_are_those_of_the_filters(what: str) -> None:
     prepared, settings = robots() if what == "robots" else flown(LOCAL if what == "local" else GLOBAL)
     layout, knots = put(prepared, settings)
     rows = Rows(prepared, layout, knots)

@@ -249,7 +249,18 @@ def test_a_flight_with_outages_is_smoothed_as_well_as_without_a_gate() -> None:
 def test_every_study_is_listed_and_no_other_is_run(tmp_path: Path) -> None:
     listed = [entry["name"] for entry in catalogue() if entry["kind"] == "study"]
     names = ["heading", "crew", "installation", "forecast", "causes", "units", "ground", "units_over_time"]
-    names += ["trajectory", "magnetic", "flux", "approach", "cooperative", "control", "landing"]
+    names += [
+        "trajectory",
+        "magnetic",
+        "flux",
+        "approach",
+        "along",
+        "runways",
+        "touchdown",
+        "cooperative",
+        "control",
+        "landing",
+    ]
     assert listed == [one.name for one in systems().studies] == names
     with pytest.raises(UsageError, match="one of heading, crew, installation, forecast"):
         study_to("weather", tmp_path / "out", runs=10, seed=1, force=False, listen=lambda event: None)

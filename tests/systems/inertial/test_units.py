@@ -1,5 +1,6 @@
 """Several INS of one flight: which one is off, by what, and what is no fault."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from groundstation.systems.inertial.units_chapter import units as chapter
 from groundstation.systems.inertial.units_growth import Noise, growth_of
 from groundstation.systems.inertial.units_limits import limits_of
 from groundstation.systems.inertial.units_log import serials_of
-from groundstation.systems.inertial.units_track import UnitTrack
+from groundstation.systems.inertial.units_track import ReferenceTrack, UnitTrack
 from tests.report_example import example
 from tests.section_contents import notes, rows
 from tests.systems.inertial.units_example import (
@@ -63,6 +64,49 @@ def test_errors_of_one_of_three_are_named_with_and_without_gnss(bad: Errors, kin
 def test_a_unit_that_contradicts_itself_is_named_even_of_two(change: Change, kind: str, number: int) -> None:
     found = judge_units(units(number, change=change), None)
     assert kinds(found) == {("ins.1",): {kind}}, found.sentence
+
+
+def turned(one: UnitTrack, degrees: float = 0.6) -> UnitTrack:
+    assert one.heading_deg is not None
+    return replace(one, heading_deg=(one.heading_deg + degrees) % 360.0)
+
+
+@pytest.mark.parametrize("reference", [gnss(), None])
+def test_a_heading_that_stands_apart_is_named_of_three_and_one_of_two(reference: ReferenceTrack | None) -> None:
+    found = judge_units(units(3, change=turned), reference)
+    (fault,) = found.faults
+    assert (found.verdict, found.off, fault.kind, fault.unit) == ("off", ("ins.1",), "heading", "deg")
+    assert fault.value == pytest.approx(0.6, abs=0.1) and fault.limit is not None and fault.limit < 0.4
+    assert found.sentence.startswith("ins.1 is off: heading +0.6") and "by parity of three units" in found.sentence
+    assert [pair.is_beyond for pair in found.pairs] == [True, False, True]
+    two = judge_units(units(2, change=turned), reference)
+    assert (two.verdict, two.off) == ("one_of", ("ins", "ins.1")) and "headings 0.6" in two.sentence
+    assert not judge_units(units(2, change=lambda one: turned(one, 0.1)), reference).faults
+
+
+def test_a_unit_of_a_lesser_class_is_held_against_its_own_limits() -> None:
+    bad = units(2, bad=drift_of(1.0))
+    assert judge_units(bad, gnss()).off == ("ins.1",)
+    stated = judge_units([bad[0], replace(bad[1], ins_class="tactical")], gnss())
+    assert stated.verdict == "agree" and [one.ins_class for one in stated.units] == ["navigation", "tactical"]
+    limits = [
+        limits_of(name, stated.pairs[0].hours, is_start_known=stated.pairs[0].is_start_known)
+        for name in ("navigation", "tactical")
+    ]
+    both = [one.pair.rate_nmiph for one in limits if one is not None]
+    assert stated.pairs[0].rate_limit_nmiph == pytest.approx(math.sqrt((both[0] ** 2 + both[1] ** 2) / 2.0))
+    section = chapter(example(stated))
+    assert section is not None and "classes navigation and tactical (each its own)" in str(section)
+
+
+def test_rounding_of_the_outputs_is_the_interval_of_a_pair() -> None:
+    def coarse(one: UnitTrack) -> UnitTrack:
+        return replace(one, velocity_mps=np.round(one.velocity_mps / 0.064) * 0.064)
+
+    fine, rough = (judge_units(units(2, change=change), None).pairs[0] for change in (lambda one: one, coarse))
+    assert fine.velocity_rms_mps is not None and rough.velocity_rms_mps is not None
+    assert fine.velocity_rms_mps.half95 < rough.velocity_rms_mps.half95
+    assert abs(fine.velocity_rms_mps.value - rough.velocity_rms_mps.value) < rough.velocity_rms_mps.half95
 
 
 def test_two_units_that_differ_are_one_of_the_two_until_gnss_tells() -> None:

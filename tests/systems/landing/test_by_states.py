@@ -11,8 +11,9 @@ from groundstation.results.arrays.states import BodyStates
 from groundstation.simulation.approach import ApproachScenario, FinalMotion, Recorded, TrueRunway, simulate_approach
 from groundstation.systems.known import Known, Runway, SiteData
 from groundstation.systems.landing.analysis import LANDING
-from groundstation.systems.landing.answer import LAST_SINK_S, SINK_S, LandingResult, Touchdown
+from groundstation.systems.landing.answer import LandingResult
 from groundstation.systems.landing.settings import LandingSettings
+from groundstation.systems.landing.touchdown_answer import LAST_SINK_S, SINK_S, Touchdown
 from groundstation.tables.phases import flight_phases
 from tests.report_example import example
 from tests.states_example import MadeStates, states_of
@@ -26,11 +27,11 @@ SIMULATED = simulate_approach(
 )
 SITE = SiteData(runways=(Runway("05", 47.0, latitude_deg=56.0, longitude_deg=38.0, length_m=RUNWAY.length_m),))
 SIGMA = 0.1
-FLARED_MPS = 0.4  # sink rate behind the flare
+FLARED_MPS, FLARED_S = 0.4, LAST_SINK_S + 0.1  # sink rate behind the flare, and for how long
 
 
 def states() -> BodyStates:
-    """States at the recorded places, that sink at 3 m/s and from half a second before the touchdown at 0.4 m/s."""
+    """States at the recorded places, that sink at 3 m/s and from FLARED_S before the touchdown at 0.4 m/s."""
     flight = SIMULATED.flight
     topic = next(one for one in flight.topics() if flight[one].has("latitude_deg"))
     time_s = np.arange(0.0, flight.duration_s, 0.05)
@@ -38,7 +39,7 @@ def states() -> BodyStates:
         name: np.interp(time_s, flight.time_s(topic), flight[topic].values(name))
         for name in ("latitude_deg", "longitude_deg")
     }
-    down = np.where(time_s < touchdown(None).time_s - LAST_SINK_S, 3.0, FLARED_MPS)
+    down = np.where(time_s < touchdown(None).time_s - FLARED_S, 3.0, FLARED_MPS)
     return states_of(time_s, SIGMA, velocity_down_mps=down, **place)
 
 
@@ -57,7 +58,7 @@ def test_sink_rate_and_place_stand_beside_the_recorded_ones() -> None:
     recorded, made = touchdown(None), touchdown(MadeStates(states()))
     assert recorded.by_states is None and made.by_states is not None
     assert replace(made, by_states=None) == recorded, "nothing that is recorded changes"
-    expected = (3.0 * (SINK_S - LAST_SINK_S) + FLARED_MPS * LAST_SINK_S) / SINK_S
+    expected = (3.0 * (SINK_S - FLARED_S) + FLARED_MPS * FLARED_S) / SINK_S
     assert made.by_states.sink_rate_mps == pytest.approx(expected, abs=0.1)
     assert made.by_states.last_sink_rate_mps == pytest.approx(FLARED_MPS, abs=1e-9)
     assert made.by_states.past_threshold_m == pytest.approx(recorded.past_threshold_m, abs=3.0)

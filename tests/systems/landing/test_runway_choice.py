@@ -242,3 +242,21 @@ def test_recorded_landings_are_on_their_runways(log: str, names: tuple[str, ...]
     measured = [error for one in found.answer.approaches for error in one.position_errors if error.state == "measured"]
     assert [error.error_m for error in measured] == [pytest.approx(one, abs=3.0) for one in errors]
     assert all(error.sigma_m is not None and 40.0 < error.sigma_m < 80.0 for error in measured)
+
+
+def test_headings_play_no_part(landed: object) -> None:
+    heading = landed["ins"].values("true_heading_deg")  # type: ignore[index]
+    magnetic = changed(landed, "ins", "true_heading_deg", (heading - 12.0) % 360.0)  # type: ignore[arg-type]
+    assert last(analysed(magnetic, table())).runway == last(analysed(landed, table())).runway
+
+
+def test_an_offset_course_and_a_place_away_from_runways_choose_nothing() -> None:
+    listed = table()
+    (one, _other) = listed.of_airport("SIM")
+    over = (one.latitude_deg + 0.002, one.longitude_deg + 0.004)
+    circling = EndOfApproach(*over, COURSE_DEG + 20.0, None, 15.0)
+    assert choose_runway(circling, listed, SETTINGS).choice.state == "none"
+    helipad = EndOfApproach(over[0] + 0.01, over[1], COURSE_DEG, None, 15.0)  # 600 m beside the runway, on its course
+    assert choose_runway(helipad, listed, SETTINGS).choice.state != "decided"
+    landed_on = EndOfApproach(*over, one.true_course_deg, None, 15.0)
+    assert choose_runway(landed_on, listed, SETTINGS).choice.state == "decided"

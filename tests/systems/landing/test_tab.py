@@ -95,7 +95,11 @@ def test_every_figure_is_drawn(with_site: FlightResults) -> None:
     section = landing(with_site)
     assert section is not None
     drawn = [part for part in drawn_by(PLOTS, section, with_site).parts if isinstance(part, Drawing)]
-    assert [one.title for one in drawn] == ["Approach 1: deviations", "Approach 1: the final"]
+    assert [one.title for one in drawn] == [
+        "Approach 1: deviations",
+        "Approach 1: the final",
+        "Approach 1: on the runway",
+    ]
     assert all("nan" not in one.svg for one in drawn)
 
 

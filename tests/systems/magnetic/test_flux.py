@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import numpy as np
@@ -37,6 +38,7 @@ from groundstation.systems.magnetic.deviation_answer import (
     flux_deviation_of,
 )
 from groundstation.systems.magnetic.deviation_to_apply import Apply
+from groundstation.systems.magnetic.flux_advice_chapter import advise
 from groundstation.systems.magnetic.flux_answer import FluxDeviation
 from groundstation.systems.magnetic.flux_bank import followed, lean_error_deg
 from groundstation.systems.magnetic.flux_epochs import find_legs, gather_epochs
@@ -51,6 +53,7 @@ from groundstation.tables.table import Flight
 from tests.real_logs import real_log
 from tests.saved import load
 from tests.schema_fields import SCHEMA
+from tests.told import next_steps
 
 SURE = 4.0  # sigmas: 5 coefficients of a few flights each
 SEED = 3
@@ -178,6 +181,32 @@ def test_a_slaved_gyro_is_seen_and_its_legs_are_corrected() -> None:
     assert bank.after_turn_s > 60.0
     assert expect_truth(answer, flown(slaved_s=80.0).coefficients_deg) >= 3
     assert any("slaved gyro" in remark for remark in answer.remarks)
+
+
+@pytest.mark.parametrize("change", [{"with_ins": False, "headings_deg": FOUR}, {"bank_deg": 6.0}])
+def test_few_or_shallow_turns_show_a_slaved_gyro(change: dict[str, Any]) -> None:
+    """Unseen, a gyro slaved over a minute would bias B and C by two to four degrees."""
+    answer = found(slaved_s=80.0, **change)
+    assert answer.bank_error.lag95_s is not None
+    assert answer.bank_error.lag95_s[0] <= 80.0 <= answer.bank_error.lag95_s[1]
+    assert expect_truth(answer, flown(slaved_s=80.0, **change).coefficients_deg) >= 3
+
+
+def test_without_a_turn_nothing_is_accepted_unless_no_gyro_is_stated() -> None:
+    none = MagneticFluxSettings(turn_bank_min_deg=80.0)  # no turn counts
+    answer = estimate_flux_deviation(flown().flight, settings=none)
+    assert (answer.verdict, answer.bank_error.state) == ("undecided", "not observable")
+    assert "no turn above 80 deg of bank" in answer.verdict_reason
+    (advice,) = advise(replace(whole_of_the_family(), answers={answer.analysis: answer}))
+    assert (advice.line, advice.text) == ("Fly", "a turn of more than 3° of bank between straight legs")
+    stated = estimate_flux_deviation(flown().flight, settings=replace(none, may_be_slaved=False))
+    assert stated.verdict == "accept"
+
+
+def test_a_log_with_heading_alone_is_not_asked_for_a_magnetometer() -> None:
+    assert not list(advise(whole_of_the_family()))
+    section = next_steps(whole_of_the_family())
+    assert section is None or "magnetometer" not in str(section)
 
 
 def test_opposite_turns_serve_a_level_valve_and_are_refused_for_one_that_hangs() -> None:

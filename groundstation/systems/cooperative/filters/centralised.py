@@ -22,6 +22,7 @@ measurements: Maybeck, Stochastic Models, Estimation, and Control, volume 1, 197
 from itertools import pairwise
 
 import numpy as np
+from scipy.linalg.blas import dger
 
 from groundstation.base.angles import FloatArray
 from groundstation.systems.cooperative.events import Prepared
@@ -36,6 +37,7 @@ from groundstation.systems.cooperative.vehicles import PATIENCE
 
 KNOWN_WRONG_SIGMAS = 3.0
 SAME_INSTANT_S = 1e-12
+SLAB = 8192  # entries of a matrix up to which OpenBLAS starts no threads, which wait for each other on a busy machine
 
 
 class JointRow:
@@ -79,8 +81,8 @@ class Joint:
         for i, place in self.points.items():
             self.P[place, place] = prepared.session.points[i].position_sigma_m ** 2 * np.eye(2)
         self.times = [vehicle.first_s for vehicle in prepared.vehicles]
+        self._slabs = [slice(at, at + max(SLAB // total, 1)) for at in range(0, total, max(SLAB // total, 1))]
         self.offsets_m = np.zeros((len(prepared.vehicles), 3))  # dead reckoning less reference place
-        self._room = np.empty((total, total))
 
     def advance(self, who: int, to_s: float) -> None:
         """Move one vehicle's block on."""
@@ -166,8 +168,8 @@ class Joint:
         gain = g / total
         self.x += gain * row.innovation
         scaled = g / np.sqrt(total)
-        np.multiply.outer(scaled, scaled, out=self._room)
-        self.P -= self._room
+        for rows in self._slabs:  # in place: the transpose is as Fortran has matrices
+            dger(-1.0, scaled, scaled[rows], a=self.P[rows].T, overwrite_a=1)
         if len(row.pieces) == 1 and np.count_nonzero(row.pieces[0][1]) == 1:
             place, h = row.pieces[0]
             at = int(np.flatnonzero(h)[0])

@@ -28,27 +28,34 @@ class Sights:
     """Antennas of receivers and of peers that send, by the number of the measurement."""
 
     def __init__(self, vehicles: Sequence[Vehicle], events: Events) -> None:
-        self._receivers = _sights(vehicles, events.receiver, events.time_s)
-        self._sources = _sights(vehicles, np.where(events.kind == PEER, events.source, -1), events.time_s)
+        self._receivers = _Antennas(vehicles, events.receiver, events.time_s)
+        self._sources = _Antennas(vehicles, np.where(events.kind == PEER, events.source, -1), events.time_s)
 
     def receiver(self, number: int) -> Sight | None:
         """Antenna of the receiver; None where it is no aircraft."""
-        return self._receivers[number]
+        return self._receivers.at(number)
 
     def source(self, number: int) -> Sight | None:
         """Antenna of the peer that sent; None where it is no aircraft."""
-        return self._sources[number]
+        return self._sources.at(number)
 
 
-def _sights(vehicles: Sequence[Vehicle], who: Int64Array, time_s: FloatArray) -> list[Sight | None]:
-    found: list[Sight | None] = [None] * len(who)
-    for number, vehicle in enumerate(vehicles):
-        mine = np.flatnonzero(who == number)
-        if not isinstance(vehicle, Aircraft) or not len(mine):
-            continue
-        at = places(vehicle, time_s[mine])
-        whole = np.zeros((len(mine), 3, vehicle.size))
-        whole[:, :, at.states] = at.derivative
-        for one, reading, derivative in zip(mine.tolist(), at.reading, whole, strict=True):
-            found[one] = Sight(reading, derivative)
-    return found
+class _Antennas:
+    """Antennas of one end of all measurements."""
+
+    def __init__(self, vehicles: Sequence[Vehicle], who: Int64Array, time_s: FloatArray) -> None:
+        sizes = [vehicle.size if isinstance(vehicle, Aircraft) else 0 for vehicle in vehicles]
+        self._size: list[int] = np.array([*sizes, 0])[who].tolist()
+        self._reading = np.zeros((len(who), 3))
+        self._derivative = np.zeros((len(who), 3, max(sizes, default=0)))
+        for number, vehicle in enumerate(vehicles):
+            mine = np.flatnonzero(who == number)
+            if isinstance(vehicle, Aircraft) and len(mine):
+                at = places(vehicle, time_s[mine])
+                self._reading[mine] = at.reading
+                for column, state in enumerate(at.states):
+                    self._derivative[mine, :, state] = at.derivative[:, :, column]
+
+    def at(self, number: int) -> Sight | None:
+        size = self._size[number]
+        return Sight(self._reading[number], self._derivative[number, :, :size]) if size else None

@@ -19,7 +19,7 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import Int64Array
 
-KEPT_BYTES = 2.5e8  # of what a pass keeps for the way back; beyond, pieces are passed again
+KEPT_BYTES = 1e8  # of what a pass keeps for the way back; beyond, pieces are passed again
 SPARSE_FROM = 120  # states, from which on the rows of a knot are multiplied as sparse ones
 
 

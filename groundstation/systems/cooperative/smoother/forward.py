@@ -11,13 +11,13 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray
 from groundstation.systems.cooperative.events import Prepared
-from groundstation.systems.cooperative.judging import PATIENCE
 from groundstation.systems.cooperative.loop_types import HEIGHT, PEER
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.smoother.chain import add_blocks, turned, updated
 from groundstation.systems.cooperative.smoother.knots import Knots
 from groundstation.systems.cooperative.smoother.layout import Layout
 from groundstation.systems.cooperative.smoother.rows import Rows
+from groundstation.systems.cooperative.vehicles import PATIENCE
 
 MOST_PASSES = 6
 Doubts = dict[tuple[int, int], int]  # vehicles opened at a knot, and how often

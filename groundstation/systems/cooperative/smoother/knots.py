@@ -11,10 +11,11 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import Int64Array
 from groundstation.systems.cooperative.aircraft import Aircraft
+from groundstation.systems.cooperative.aircraft_motion import dynamics
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.loop_types import HEIGHT, PEER
 from groundstation.systems.cooperative.settings import CooperativeSettings
-from groundstation.systems.cooperative.smoother.aircraft_group import dynamics, transitions
+from groundstation.systems.cooperative.smoother.aircraft_group import transitions
 from groundstation.systems.cooperative.timeline import timeline
 
 NEGLECTED = 0.02  # largest share of a reading's variance that the motion to its knot adds

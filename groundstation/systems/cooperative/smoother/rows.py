@@ -11,11 +11,13 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.systems.cooperative.events import Prepared
+from groundstation.systems.cooperative.filters.observation import LIGHT_MPS, NEAREST_M
 from groundstation.systems.cooperative.loop_types import HEIGHT, PEER, POINT, SATELLITE, Events
-from groundstation.systems.cooperative.observation import LIGHT_MPS, NEAREST_M
 from groundstation.systems.cooperative.smoother.knots import Knots
 from groundstation.systems.cooperative.smoother.layout import Layout, pair_of
 from groundstation.systems.cooperative.smoother.sight import Ends, RangeErrors
+
+AT_ONCE = 20_000  # readings linearised together
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +125,21 @@ class Rows:
 
     def linearise(self, x: FloatArray, first: int, last: int) -> Linearised:
         """Linearise the rows of the knots first to last - 1 about their states (l, n)."""
+        if self._first_event[last] - self._first_event[first] <= AT_ONCE or last - first < 2:
+            return self._linearised(x, first, last)
+        residual = np.empty(int(self.first[last] - self.first[first]))
+        values = np.empty((len(residual), self.columns.shape[1]))
+        one = first
+        while one < last:
+            two = int(np.searchsorted(self._first_event, self._first_event[one] + AT_ONCE, side="right")) - 1
+            two = min(max(two, one + 1), last)
+            part = self._linearised(x[one - first : two - first], one, two)
+            rows = slice(int(self.first[one] - self.first[first]), int(self.first[two] - self.first[first]))
+            residual[rows], values[rows] = part.residual, part.values
+            one = two
+        return Linearised(residual, values)
+
+    def _linearised(self, x: FloatArray, first: int, last: int) -> Linearised:
         part = slice(int(self._first_event[first]), int(self._first_event[last]))
         whole = np.concatenate([x, np.zeros((len(x), 1))], axis=1)  # the state behind the last is 0
         states = whole[(self._knot[part] - first)[:, None], self._all_columns[part]]

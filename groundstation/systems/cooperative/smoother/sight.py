@@ -5,7 +5,7 @@ motion from there.
 """
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import Int64Array
@@ -45,6 +45,15 @@ class RangeErrors:
     by_state: FloatArray  # (m, n)
     scale: FloatArray  # (m,)
     by_scale: int
+
+
+class OutputStates(NamedTuple):
+    """A vehicle at some times, from its states at the knots."""
+
+    position_m: FloatArray  # (m, 3)
+    state: FloatArray  # (m, n)
+    covariance: FloatArray  # (m, n, n)
+    by_knot: FloatArray  # (m, n, n) derivative of the state by that at the knot
 
 
 class Ends(Protocol):
@@ -105,10 +114,8 @@ class Group(Protocol):
     def ends(self, who: Int64Array, time_s: FloatArray, knot: Int64Array) -> Ends:
         """Return ends at vehicles of this group at some times, each seen from a knot."""
 
-    def states_at(
-        self, who: int, time_s: FloatArray, knot: Int64Array, x: FloatArray, P: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return positions (m, 3), states and covariances of one vehicle at some times.
+    def states_at(self, who: int, time_s: FloatArray, knot: Int64Array, x: FloatArray, P: FloatArray) -> OutputStates:
+        """Return positions, states and covariances of one vehicle at some times.
 
         ``x`` (m, n) and ``P`` (m, n, n) stand at the knots.
         """

@@ -9,6 +9,7 @@ Source: Barfoot, State Estimation for Robotics, 2nd ed. 2024, chapters 3 to 5 (b
 """
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -19,14 +20,16 @@ from groundstation.systems.cooperative.loop_types import GATED, USED
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.smoother.chain import Chain, Problem, block
 from groundstation.systems.cooperative.smoother.forward import Doubts, doubt_blocks, first_pass
-from groundstation.systems.cooperative.smoother.knots import knots_of
-from groundstation.systems.cooperative.smoother.layout import layout_of
+from groundstation.systems.cooperative.smoother.knots import Knots, knots_of
+from groundstation.systems.cooperative.smoother.layout import Layout, layout_of
 from groundstation.systems.cooperative.smoother.rows import Linearised, Rows
+from groundstation.systems.cooperative.smoother.sight import OutputStates
 from groundstation.systems.cooperative.smoother.weights import Repetitions, cauchy, honest_factor, loss
 from groundstation.systems.cooperative.tracks import AlgorithmRun, JudgedMeasurements, VehicleTrack
 
-SETTLED = 0.02  # a last step that moves no state of the readings by more in all, in shares of a sigma, ends the passes
+SETTLED = 0.05  # a last step that moves no state of the readings by more in all, in shares of a sigma, ends the passes
 HALVINGS = 4
+MOST_RELATIVE = 12  # vehicles, up to which covariances of their places to one another are made
 
 
 @dataclass(frozen=True)
@@ -84,6 +87,43 @@ def smooth(prepared: Prepared, settings: CooperativeSettings, *, innovates: bool
     return _Smoother(prepared, settings).run(innovates=innovates)
 
 
+_Output = tuple[FloatArray, Int64Array, OutputStates]  # times, knots among those of outputs, states
+
+
+def _relative(one: _Output, two: _Output, shared: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return times of outputs of two vehicles, and the covariance of one to the other."""
+    time_s, at, to = np.intersect1d(one[0], two[0], return_indices=True)
+    both = one[2].by_knot[at, :2] @ shared[one[1][at]] @ two[2].by_knot[to, :2].swapaxes(1, 2)
+    own = one[2].covariance[at, :2, :2] + two[2].covariance[to, :2, :2]
+    return time_s, own - both - both.swapaxes(1, 2)
+
+
+@dataclass(frozen=True)
+class SmoothedProblem:
+    """Answer of the smoother with the problem at it, for what can be asked of it besides.
+
+    Parameters
+    ----------
+    smoothed : SmoothedRun
+    problem : Problem
+        Linearised at the answer, with the weights that make honest covariances.
+    rows : Rows
+    layout : Layout
+    knots : Knots
+    """
+
+    smoothed: SmoothedRun
+    problem: Problem
+    rows: Rows
+    layout: Layout
+    knots: Knots
+
+
+def smooth_problem(prepared: Prepared, settings: CooperativeSettings) -> SmoothedProblem:
+    """Smooth a session, and keep the problem at the answer."""
+    return _Smoother(prepared, settings).with_problem()
+
+
 class _Smoother:
     def __init__(self, prepared: Prepared, settings: CooperativeSettings) -> None:
         self._prepared, self._settings = prepared, settings
@@ -111,6 +151,11 @@ class _Smoother:
             self._factor = factor
             x, seen, passes, has_settled = self._settle(x, seen, passes)
         return self._finish(x, seen, passes, has_settled)
+
+    def with_problem(self) -> SmoothedProblem:
+        """Run, and keep the problem at the answer."""
+        run = self.run(innovates=True)
+        return SmoothedProblem(run, self._problem_at_end, self._rows, self._layout, self._knots)
 
     def _still(self) -> FloatArray:
         """Return the states at all knots as the motion alone leads them."""
@@ -213,33 +258,45 @@ class _Smoother:
 
     def _finish(self, x: FloatArray, seen: Linearised, passes: int, has_settled: bool) -> SmoothedRun:
         layout, knots, prepared = self._layout, self._knots, self._prepared
+        self._problem_at_end = self._problem(x, seen, honest=True)
         blocks = [np.empty((len(x), layout.groups[g].size, layout.groups[g].size)) for g, _, _ in layout.of_vehicle]
+        pairs = list(combinations(range(len(blocks)), 2)) if len(blocks) <= MOST_RELATIVE else []
+        asked = {knot: number for number, knot in enumerate(np.unique(knots.output_knot).tolist())}
+        shared = {
+            (i, j): np.empty((len(asked), blocks[i].shape[1], blocks[j].shape[1])) for i, j in pairs
+        }  # of two vehicles, at the knots of outputs
         points: list[SmoothedPoint] = []
-        for knot, P, _L, behind in Chain(self._problem(x, seen, honest=True)).covariances():
+        for knot, P, _L, behind in Chain(self._problem_at_end).covariances():
             for vehicle in range(len(blocks)):
                 blocks[vehicle][knot] = block(P, behind, layout.of(vehicle))
+            for i, j in pairs if knot in asked else ():
+                one, two = layout.of(i), layout.of(j)
+                shared[i, j][asked[knot]] = P[one, two] - behind[one] @ P[:, two]
             if not knot:
                 for point in np.flatnonzero(layout.points >= 0).tolist():
                     at = slice(int(layout.points[point]), int(layout.points[point]) + 2)
                     points.append(SmoothedPoint(point, x[0, at].copy(), block(P, behind, at)))
-        tracks = []
-        for vehicle, one in enumerate(prepared.vehicles):
+        tracks, outputs = [], []
+        for vehicle, one_vehicle in enumerate(prepared.vehicles):
             mine = knots.output_vehicle == vehicle
-            time_s, knot = knots.output_s[mine], knots.output_knot[mine]
+            time_s, knot_of = knots.output_s[mine], knots.output_knot[mine]
             group, index, _ = layout.of_vehicle[vehicle].tolist()
-            position, state, covariance = layout.groups[group].states_at(
-                index, time_s, knot, x[knot][:, layout.of(vehicle)], blocks[vehicle][knot]
+            out = layout.groups[group].states_at(
+                index, time_s, knot_of, x[knot_of][:, layout.of(vehicle)], blocks[vehicle][knot_of]
             )
-            tracks.append(VehicleTrack(one.name, time_s, position, state, covariance, one.height))
-        run = AlgorithmRun(
-            "smoothed",
-            "batch",
-            tuple(tracks),
-            *self._judged(seen),
-            {},
-            np.zeros(0),
-            np.zeros(0),
-        )
+            outputs.append((time_s, np.array([asked[one] for one in knot_of.tolist()], dtype=np.int64), out))
+            tracks.append(
+                VehicleTrack(one_vehicle.name, time_s, out.position_m, out.state, out.covariance, one_vehicle.height)
+            )
+        judged, counts = self._judged(seen)
+        if not has_settled:
+            counts["unsettled"] = 1
+        signs = [1.0 if vehicle.heading >= 0 else -1.0 for vehicle in prepared.vehicles]  # a place, or its error
+        relative = {
+            (i, j): _relative(outputs[i], outputs[j], signs[i] * signs[j] * both) for (i, j), both in shared.items()
+        }
+        none = np.zeros(0)
+        run = AlgorithmRun("smoothed", "batch", tuple(tracks), judged, counts, {}, none, none, relative)
         return SmoothedRun(run, tuple(points), passes, has_settled)
 
     def _judged(self, seen: Linearised) -> tuple[JudgedMeasurements, dict[str, int]]:

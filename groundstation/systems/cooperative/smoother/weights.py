@@ -12,7 +12,7 @@ Huber, Robust Statistics, 1981, section 6.3 (covariance of an M-estimate).
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.base.records import BoolArray
+from groundstation.base.records import BoolArray, Int64Array
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.loop_types import PEER, POINT
 from groundstation.systems.cooperative.settings import CooperativeSettings
@@ -58,54 +58,44 @@ def honest_factor(scale: float) -> float:
 
 
 class Repetitions:
-    """Readings of the same links one after the other."""
+    """Readings of the same links one after the other.
+
+    Where several antennas measure at one time, each follows by its place among them.
+    """
 
     def __init__(self, prepared: Prepared, rows: Rows) -> None:
-        events = prepared.events
-        self._time_s = events.time_s[rows.event]
+        events, many = prepared.events, len(rows.event)
+        time_s = events.time_s[rows.event]
         link = np.stack([events.receiver[rows.event], events.source[rows.event], rows.kind, rows.is_bearing])
-        order = np.lexsort((self._time_s, *link))
+        link = np.concatenate([link, _rank_of(link, time_s)[None]])
+        order = np.lexsort((time_s, *link))
         same = (link[:, order[1:]] == link[:, order[:-1]]).all(axis=0)
-        same &= np.isin(rows.kind[order[1:]], (PEER, POINT))
         self._later, self._before = order[1:][same], order[:-1][same]
-        since = self._time_s[self._later] - self._time_s[self._before]
-        is_new = since > 0.0  # several antennas of a pair measure at one time
-        self._since_s = np.full(len(rows.event), np.inf)
-        latest = np.full(len(rows.event), np.inf)
-        for row, before, gap_s in zip(self._later.tolist(), self._before.tolist(), since.tolist(), strict=True):
-            latest[row] = gap_s if gap_s > 0.0 else latest[before]
-        self._since_s[self._later] = latest[self._later]
-        self._later, self._before, self._gap_s = self._later[is_new], self._before[is_new], since[is_new]
-        is_link = np.isin(rows.kind, (PEER, POINT))
-        self._classes = [
-            mask
-            for mask in (
-                is_link & (rows.kind == PEER) & ~rows.is_bearing,
-                is_link & (rows.kind == POINT) & ~rows.is_bearing,
-                is_link & rows.is_bearing,
-            )
-            if mask.any()
-        ]
+        self._gap_s = time_s[self._later] - time_s[self._before]
+        self._since_s = np.full(many, np.inf)
+        self._since_s[self._later] = self._gap_s
+        classes = [(rows.kind == kind) & (rows.is_bearing == bearing) for kind in (PEER, POINT) for bearing in (0, 1)]
+        self._classes = [mask for mask in classes if mask.any()]
 
     def factors(self, normal: FloatArray, settings: CooperativeSettings) -> FloatArray:
-        """Return the factors of the rows' variances, from the residuals over their sigmas."""
-        factor = np.ones(len(normal))
-        if settings.correlated_share > 0.0:  # as stated, and in the variances already
-            return factor
+        """Return the factors of the rows' variances, from the residuals over their sigmas.
+
+        A stated share is in the variances already; then the factor is what the residuals show beyond it.
+        """
+        factor, stated = np.ones(len(normal)), settings.correlated_share
         for mine in self._classes:
-            share = self.share(normal, mine, settings)
+            measured = self.share(normal, mine, settings)
             since = np.clip(self._since_s[mine] / settings.correlation_s, 0.01, 100.0)
-            factor[mine] = 1.0 - share + share / np.tanh(since / 2.0)
+            factor[mine] = np.maximum(_as_white(measured, since) / _as_white(stated, since), 1.0)
         return factor
 
     def share(self, normal: FloatArray, mine: BoolArray, settings: CooperativeSettings) -> float:
         """Return the share of the variance that stays between readings of a link."""
-        time_s = settings.correlation_s
+        time_s, assumed = settings.correlation_s, settings.smoother.correlated_share
         pairs = mine[self._later] & (self._gap_s < LONGEST * time_s)
         pairs &= np.isfinite(normal[self._later]) & np.isfinite(normal[self._before])
         kept = np.exp(-self._gap_s[pairs] / time_s)
         worth = float((kept**2).sum())
-        assumed = settings.smoother.correlated_share
         if worth <= 0.0:
             return assumed
         value = np.clip(normal, -FAR, FAR)
@@ -113,3 +103,18 @@ class Repetitions:
         both = float((kept * value[self._later[pairs]] * value[self._before[pairs]]).sum())
         found = both / worth / max(square, 1e-12) - SURE_SIGMAS / np.sqrt(worth)
         return float((worth * np.clip(found, 0.0, 0.95) + FEW * assumed) / (worth + FEW))
+
+
+def _as_white(share: float, since: FloatArray) -> FloatArray:
+    """Return the factor of the variance that makes readings white ones; see ``events``."""
+    return np.asarray(1.0 - share + share / np.tanh(since / 2.0))
+
+
+def _rank_of(link: Int64Array, time_s: FloatArray) -> Int64Array:
+    """Return the place of each row among those of its link at its time: 0, 1, ..."""
+    order = np.lexsort((time_s, *link))
+    is_new = (link[:, order[1:]] != link[:, order[:-1]]).any(axis=0) | (np.diff(time_s[order]) != 0.0)
+    starts = np.flatnonzero(np.concatenate([[True], is_new])) if len(order) else np.zeros(0, dtype=np.int64)
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order)) - np.repeat(starts, np.diff(np.append(starts, len(order))))
+    return rank

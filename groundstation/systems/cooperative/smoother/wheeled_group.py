@@ -10,7 +10,7 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import Int64Array
 from groundstation.systems.cooperative.settings import CooperativeSettings
-from groundstation.systems.cooperative.smoother.sight import Motion, RangeErrors, Sight
+from groundstation.systems.cooperative.smoother.sight import Motion, OutputStates, RangeErrors, Sight
 from groundstation.systems.cooperative.vehicles import SAME_TIME_S
 from groundstation.systems.cooperative.wheeled_vehicle import WheeledVehicle
 from groundstation.tables.session import Odometry
@@ -142,14 +142,12 @@ class WheeledGroup:
         moved, phi, _ = self._step(x, epoch, step_s, noisy=False)
         return moved, phi
 
-    def states_at(
-        self, who: int, time_s: FloatArray, knot: Int64Array, x: FloatArray, P: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return positions (m, 3), states and covariances of one vehicle at some times."""
+    def states_at(self, who: int, time_s: FloatArray, knot: Int64Array, x: FloatArray, P: FloatArray) -> OutputStates:
+        """Return positions, states and covariances of one vehicle at some times."""
         own_s = self._own_s[knot, who]
         state, phi = self.short(x, self.epoch(who, np.minimum(own_s, time_s)), time_s - own_s)
         position_m = np.column_stack([state[:, :2], np.zeros(len(state))])
-        return position_m, state, phi @ P @ phi.swapaxes(1, 2)
+        return OutputStates(position_m, state, phi @ P @ phi.swapaxes(1, 2), phi)
 
 
 class WheeledEnds:

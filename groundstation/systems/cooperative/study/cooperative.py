@@ -5,9 +5,10 @@ Every published figure with ours beside it, and how honest ours is.
 
 from collections.abc import Sequence
 
-from groundstation.systems.cooperative.study.cases import CASES, FIRST_SEED, PublishedCase
+from groundstation.systems.cooperative.study.cases import CASES, FIRST_SEED
 from groundstation.systems.cooperative.study.page import page, study_table
 from groundstation.systems.cooperative.study.pairwise_family import FAMILY, Net, pairwise_section, pairwise_table
+from groundstation.systems.cooperative.study.published_case import PublishedCase
 from groundstation.systems.cooperative.study.runs import WORKERS, Progress, run_cases
 from groundstation.systems.study import StudyResult
 

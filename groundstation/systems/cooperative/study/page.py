@@ -8,7 +8,7 @@ from groundstation.chapters.parts import Section
 from groundstation.methods.intervals import nees_limits
 from groundstation.results.figures import FigureData
 from groundstation.systems.cooperative.consistency import DIVERGED
-from groundstation.systems.cooperative.study.cases import FACTOR, PublishedCase
+from groundstation.systems.cooperative.study.published_case import FACTOR, PublishedCase
 from groundstation.systems.cooperative.study.runs import CaseRun, diverges
 from groundstation.systems.study import grid, section
 

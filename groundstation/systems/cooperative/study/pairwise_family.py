@@ -152,7 +152,7 @@ def pairwise_section(data: FigureData, runs: int) -> Section:
     told = data["not_told"] == ""
     held = int((data["refused_or_consistent"][told] == "yes").sum())
     return section(
-        "Stored pairwise covariances: sparse encounters",
+        "Stored pairwise covariances: encounters without loops",
         f"{min(runs, MOST_RUNS)} sessions a row. Expected: NEES worked out before any truth is looked at, by geometry "
         "and stated sigmas (mean over the session, and its worst time, by which the algorithm is refused). Measured: "
         f"mean over aircraft, session and runs, with 99 % limits of that many runs. {held} of {int(told.sum())} rows "

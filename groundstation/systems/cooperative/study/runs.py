@@ -19,7 +19,8 @@ from groundstation.systems.cooperative.algorithms import run_algorithm
 from groundstation.systems.cooperative.consistency import DIVERGED, normalised
 from groundstation.systems.cooperative.events import Prepared, prepare
 from groundstation.systems.cooperative.settings import CooperativeSettings
-from groundstation.systems.cooperative.study.cases import PublishedCase, settings_of
+from groundstation.systems.cooperative.study.cases import settings_of
+from groundstation.systems.cooperative.study.published_case import PublishedCase
 from groundstation.systems.cooperative.study.source_formula import RULES, run_rule
 from groundstation.systems.cooperative.tracks import AlgorithmRun
 

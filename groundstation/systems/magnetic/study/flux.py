@@ -18,6 +18,7 @@ from groundstation.systems.study import StudyResult, section, table
 
 SEED_STEP = 100_000
 FOUR, TWO = (0.0, 90.0, 180.0, 270.0), (0.0, 180.0)
+SHALLOW_DEG = 6.0  # of bank: such turns do not show lean and lag
 CELLS: Mapping[str, FluxFlightSettings] = {
     "INS": FluxFlightSettings(),
     "wind solved": FluxFlightSettings(with_ins=False),
@@ -25,6 +26,13 @@ CELLS: Mapping[str, FluxFlightSettings] = {
     "two legs": FluxFlightSettings(with_ins=False, headings_deg=TWO),
     "slaved": FluxFlightSettings(slaved_s=60.0),
     "slaved, wind solved": FluxFlightSettings(slaved_s=60.0, with_ins=False),
+    "shallow turns": FluxFlightSettings(bank_deg=SHALLOW_DEG),
+    "shallow turns, slaved": FluxFlightSettings(bank_deg=SHALLOW_DEG, slaved_s=60.0),
+    "four legs, slaved": FluxFlightSettings(with_ins=False, headings_deg=FOUR, slaved_s=60.0),
+    "four legs, slaved, wind changes": FluxFlightSettings(
+        with_ins=False, headings_deg=FOUR, slaved_s=60.0, wind_wander_mps=2.0
+    ),
+    "shallow turns, slaved, load": FluxFlightSettings(bank_deg=SHALLOW_DEG, slaved_s=60.0, load_deg=1.5),
     "opposite turns": FluxFlightSettings(lean=0.0, headings_deg=TWO, full_turns=2),
     "steps of 1 deg": FluxFlightSettings(with_ins=False, step_deg=1.0),
     "wind changes": FluxFlightSettings(with_ins=False, wind_wander_mps=2.0),

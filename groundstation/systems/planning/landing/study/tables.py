@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from groundstation.results.figures import FigureData
-from groundstation.results.landing_categories import CATEGORIES
+from groundstation.results.landing_categories import CATEGORIES, LINEAR_95
 from groundstation.systems.planning.landing.answer import TOUCHDOWN, WHITE, AccuracyRow, RangeLanding
 from groundstation.systems.planning.landing.study.cases import CLAIMS, FACTOR, SIGMAS, Axis, Figure, PublishedCategory
 
@@ -55,15 +55,21 @@ def holds(claim: PublishedCategory, error_m: float) -> bool:
 def category_table(answers: Mapping[str, RangeLanding]) -> FigureData:
     """Tabulate published claims of categories with our 95 % figures.
 
-    Our figures are those at the threshold and at touchdown.
+    Our figures are those at the threshold, at touchdown, and in height the least on the path: over the third point.
     """
     rows = []
     for claim in CLAIMS:
         answer = answers[claim.approach]
         at_threshold, at_touchdown = (error_95_m(answer.at(place), claim.axis) for place in (THRESHOLD, TOUCHDOWN))
         verdicts = ["holds" if holds(claim, error) else "refuted" for error in (at_threshold, at_touchdown)]
-        rows.append((claim.approach, claim.axis, claim.published, at_threshold, verdicts[0], at_touchdown, verdicts[1]))
-    names = ("approach", "axis", "published", "threshold_95_m", "at_threshold", "touchdown_95_m", "at_touchdown")
+        least = LINEAR_95 * answer.least_up_m if claim.axis == "vertical" else float("nan")
+        at_least = "" if claim.axis != "vertical" else "holds" if holds(claim, least) else "refuted"
+        verdict = (at_threshold, verdicts[0], at_touchdown, verdicts[1], least, at_least)
+        rows.append((claim.approach, claim.axis, claim.published, *verdict))
+    names = (
+        *("approach", "axis", "published", "threshold_95_m", "at_threshold", "touchdown_95_m", "at_touchdown"),
+        *("least_95_m", "at_least"),
+    )
     return table("landing_published_categories", names, rows)
 
 

@@ -1,0 +1,1 @@
+"""Ground stations judged: their places, clocks and datum, and the weight of their errors."""

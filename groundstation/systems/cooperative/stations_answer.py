@@ -1,0 +1,119 @@
+"""Answer about the ground stations of a session: rows of the cooperative answer."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+StationVerdict = Literal["fits", "off", "one of several", "left out"]
+
+
+@dataclass(frozen=True)
+class StationRow:
+    """One ground station as the ranges judge it.
+
+    Parameters
+    ----------
+    station : str
+    verdict : {'fits', 'off', 'one of several', 'left out'}
+        ``one of several``: it or another of those with this verdict is off. ``left out``: its ranges are too long or
+        too short by a delay (its clock), and are not used.
+    ranges : int
+    chance : float
+        Chance of residuals as bad as these when the station is right, times the number of questions asked, at most 1.
+    shift_m, shift_sigma_m, shift_direction_deg : float or None
+        From the place in the stations file to where the ranges put the station if it alone is off, and the sigma of the
+        size; None where no shift can be seen.
+    delay_m, delay_sigma_m : float or None
+        By how much its ranges are too long if that alone is wrong.
+    detectable_best_m, detectable_worst_m : float or None
+        Smallest shift that is found with 95 %, in the best and in the worst direction; None: none is.
+    metres_per_metre : float
+        By how much a metre of shift moves the smoothed answer, worst direction, aircraft and time.
+    moves_most : str
+        That aircraft.
+    stated_sigma_m, used_sigma_m : float
+        Sigma of its place as stated, and as the answer takes it.
+    survey_north_m, survey_east_m, survey_sigma_north_m, survey_sigma_east_m : float or None
+        Where the answer puts it, off its place in the file, and the sigmas; where its place is not taken as exact.
+    """
+
+    station: str
+    verdict: StationVerdict
+    ranges: int
+    chance: float
+    shift_m: float | None
+    shift_sigma_m: float | None
+    shift_direction_deg: float | None
+    delay_m: float | None
+    delay_sigma_m: float | None
+    detectable_best_m: float | None
+    detectable_worst_m: float | None
+    metres_per_metre: float
+    moves_most: str
+    stated_sigma_m: float
+    used_sigma_m: float
+    survey_north_m: float | None
+    survey_east_m: float | None
+    survey_sigma_north_m: float | None
+    survey_sigma_east_m: float | None
+
+
+@dataclass(frozen=True)
+class ProtectionRow:
+    """Bound of an aircraft's smoothed error while a station is off by what the test finds.
+
+    ``worst_m`` over the session, ``end_m`` at its end.
+    """
+
+    vehicle: str
+    worst_m: float
+    end_m: float
+
+
+@dataclass(frozen=True)
+class DatumRow:
+    """One datum as the hypothesis that the stations file is in it, taken for WGS-84.
+
+    Parameters
+    ----------
+    datum : str
+    shift_m : float
+        Largest error that a station would have.
+    evidence : float
+        Twice the log of the likelihood ratio against the file as it is.
+    is_decidable : bool
+        The session would tell it.
+    is_told : bool
+    """
+
+    datum: str
+    shift_m: float
+    evidence: float
+    is_decidable: bool
+    is_told: bool
+
+
+@dataclass(frozen=True)
+class StationsAnswer:
+    """Ground stations as the session judges them.
+
+    Parameters
+    ----------
+    rows : tuple of StationRow
+    protection : tuple of ProtectionRow
+    datums : tuple of DatumRow
+    raised : dict of str to float
+        Sigmas of INS and clocks (``cooperative.ins``) that were raised for the tests, because the session shows more
+        than was believed, with the factor.
+    repetition : float
+        Factor by which readings of the stations tell less than as many independent ones.
+    """
+
+    rows: tuple[StationRow, ...]
+    protection: tuple[ProtectionRow, ...]
+    datums: tuple[DatumRow, ...]
+    raised: dict[str, float]
+    repetition: float
+
+    def with_verdict(self, verdict: StationVerdict) -> tuple[StationRow, ...]:
+        """Return the stations of one verdict."""
+        return tuple(row for row in self.rows if row.verdict == verdict)
