@@ -6,11 +6,12 @@ VENV   ?= .venv
 BIN    := $(VENV)/bin
 RUNTIME := $(VENV)/.runtime
 DEV     := $(VENV)/.dev
+SITE    := $(VENV)/.site
 # Bytecode is kept: the tests start hundreds of processes. It comes with the first import, and only of what is imported.
 PIP     := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test robots check types style slow fuzz golden schemas bench lock newest sbom clean help
+.PHONY: demo test site robots check types style slow fuzz golden schemas bench lock newest sbom clean help
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -56,6 +57,13 @@ style:
 robots: $(DEV) ## tests of the plug-in benchmarks/recorded_robots, installed below build/
 	$(PIP) --upgrade --no-deps --target build/recorded_robots ./benchmarks/recorded_robots
 	PYTHONPATH=build/recorded_robots $(BIN)/python -m pytest -q benchmarks/recorded_robots/tests
+
+$(SITE): pyproject.toml | $(BIN)/python
+	@$(call INSTALL,.[site])
+	@touch $@
+
+site: $(SITE) ## the pages of docs/ and those that the code writes as a site, build/site/html; a broken link is an error
+	$(BIN)/python docs/site/build.py
 
 slow: $(DEV) ## the long Monte Carlo tests
 	$(BIN)/python -m pytest -q -n auto --dist worksteal -m slow

@@ -324,12 +324,25 @@ def list_(
             help="A log, flight folder or session: would each analysis run on it?", metavar="LOG", readable=False
         ),
     ] = None,
+    settings: Annotated[
+        bool, typer.Option("--settings", help="List every setting instead: unit, default, range, meaning.")
+    ] = False,
     profile: Profile = None,
     json: Json = False,
     verbose: Verbose = False,
 ) -> int | None:
     """List the analyses and what each needs; with a LOG, whether each would run and why not."""
     from groundstation.cli import printing
+
+    if settings:
+        from groundstation.base.serial import to_json
+        from groundstation.pipeline.verbs.settings_list import every_setting
+
+        if log is not None:
+            raise UsageError("list --settings", "a LOG too", "one of them")
+        every = every_setting()
+        tell(printing.as_json(to_json(every)) if json else printing.settings(every))
+        return DONE
     from groundstation.pipeline.verbs.catalogue import catalogue
 
     entries = catalogue(log, profile)

@@ -3,13 +3,16 @@
 from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path, PurePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from groundstation.base.text_columns import columns
 from groundstation.cli.lines import Lines
 from groundstation.cli.text import as_json, printable, say, tell
 from groundstation.pipeline.one_flight.outcome import Outcome, State, worst_code
 from groundstation.pipeline.verbs.describe import BusWord, Description
+
+if TYPE_CHECKING:
+    from groundstation.pipeline.verbs.settings_list import Setting
 
 NAMED_SHOWN = 6  # words of a bus that an ICD names, listed one by one
 
@@ -202,6 +205,15 @@ KINDS = {
     "study": "studies",
     "not loaded": "not loaded",
 }
+
+
+def settings(every: "Sequence[Setting]") -> str:
+    """Return the text of ``list --settings``: a block for each table of a settings file."""
+    parts = []
+    for table, found in groupby(every, key=lambda one: one.table):
+        rows = [[one.key, one.default, one.unit, one.allowed, one.meaning] for one in found]
+        parts.append(f"[{table}]\n" + columns([["setting", "default", "unit", "allowed", "meaning"], *rows]))
+    return "\n\n".join(parts)
 
 
 def catalogue(entries: Sequence[Mapping[str, Any]], is_about_a_log: bool) -> str:

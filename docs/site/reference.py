@@ -1,0 +1,120 @@
+"""Pages of the site that the code itself writes: verbs, settings, findings, formats, analyses."""
+
+import ast
+from collections.abc import Iterator, Mapping
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import typer.main
+
+import groundstation
+from groundstation.cli.main import app
+from groundstation.pipeline.verbs.catalogue import catalogue
+from groundstation.pipeline.verbs.settings_list import every_setting
+
+PACKAGE = Path(groundstation.__file__).parent
+
+
+def pages() -> Mapping[str, str]:
+    """Return the pages by the names of their files."""
+    return {
+        "ref_verbs.md": _verbs(),
+        "ref_settings.md": _settings(),
+        "ref_findings.md": _findings(),
+        "ref_analyses.md": _catalogue("Analyses", "analysis"),
+        "ref_formats.md": _catalogue("Formats", "format"),
+        "ref_scenarios.md": _catalogue("Simulated flights and sessions", "scenario", "session"),
+        "ref_studies.md": _catalogue("Studies", "study"),
+    }
+
+
+def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    """Return a table of Markdown."""
+    lines = [head, tuple("---" for _ in head), *rows]
+    return "\n".join("| " + " | ".join(_cell(cell) for cell in row) + " |" for row in lines) + "\n"
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.split()).replace("|", "\\|").replace("<", "&lt;")
+
+
+def _verbs() -> str:
+    command = typer.main.get_command(app)
+    parts = [
+        "# Every verb and option\n",
+        "Written from the program itself; `groundstation VERB --help` tells the same.\n",
+    ]
+    for name, one in _commands(command, "groundstation"):
+        parts.append(f"## {name.removeprefix('groundstation ')}\n\n{one.help or ''}\n")
+        rows = []
+        for parameter in one.params:
+            names = ", ".join((*parameter.opts, *parameter.secondary_opts))
+            is_option = parameter.param_type_name == "option"
+            label = f"`{names}`" if is_option else f"`{(parameter.metavar or parameter.name).upper()}`"
+            rows.append((label, getattr(parameter, "help", "") or ""))
+        parts.append(table(("option", "meaning"), rows))
+    return "\n".join(parts)
+
+
+def _commands(command: Any, path: str) -> Iterator[tuple[str, Any]]:
+    inside: Mapping[str, Any] = getattr(command, "commands", {})
+    for name, inner in inside.items():
+        yield from _commands(inner, f"{path} {name}")
+    if not inside:
+        yield path, command
+
+
+def _settings() -> str:
+    parts = [
+        "# Every setting\n",
+        "Tables and keys of a settings file; `groundstation list --settings` prints the same.\n",
+    ]
+    for name, found in groupby(every_setting(), key=lambda one: one.table):
+        rows = [(f"`{one.key}`", one.default, one.unit, one.allowed, one.meaning) for one in found]
+        parts.append(f"## `[{name}]`\n\n" + table(("setting", "default", "unit", "allowed", "meaning"), rows))
+    return "\n".join(parts)
+
+
+def _findings() -> str:
+    rows: dict[str, tuple[set[str], str]] = {}
+    for path in sorted(PACKAGE.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Finding"):
+                continue
+            arguments: list[Any] = [*node.args, None, None, None]
+            named = {one.arg: one.value for one in node.keywords}
+            severity, code, text = (
+                _told(named.get(name) or arguments[place]) for place, name in enumerate(("severity", "code", "text"))
+            )
+            if "." in code and not code.startswith("..."):
+                severities, first = rows.setdefault(code, (set(), text))
+                severities.add(severity)
+                rows[code] = severities, first or text
+    told = [
+        (f"`{code}`", ", ".join(sorted(found - {""})) or "by its size", text) for code, (found, text) in rows.items()
+    ]
+    return "# Codes of findings\n\nWhat a report, summary.json and `check` may say of a log, by its code.\n\n" + table(
+        ("code", "severity", "text"), sorted(told)
+    )
+
+
+def _told(node: ast.expr | None) -> str:
+    """Return a text as the code writes it, values as an ellipsis; empty where it is made elsewhere."""
+    if isinstance(node, ast.Constant):
+        return str(node.value)
+    if isinstance(node, ast.JoinedStr):
+        return "".join(str(part.value) if isinstance(part, ast.Constant) else "..." for part in node.values)
+    return ""
+
+
+def _catalogue(title: str, *kinds: str) -> str:
+    rows = [
+        (f"`{entry['name']}`", str(entry["title"]), str(entry["needs"]).replace("nothing", ""))
+        for entry in catalogue()
+        if entry["kind"] in kinds
+    ]
+    head = ("name", "what", "needs")
+    if not any(row[2] for row in rows):
+        return f"# {title}\n\n" + table(head[:2], [row[:2] for row in rows])
+    return f"# {title}\n\n" + table(head, rows)

@@ -1,0 +1,64 @@
+"""Every setting as `list --settings` tells it: what the code holds, and nothing else."""
+
+import dataclasses
+import json
+from typing import Literal
+
+from groundstation.base.toml_settings import number, settings_from
+from groundstation.pipeline.verbs.settings_list import every_setting, meanings, settings_of
+from groundstation.systems import systems
+from tests.test_cli import groundstation
+
+
+@dataclasses.dataclass(frozen=True)
+class Inner:
+    width_m: float = number(2.5, 0.0, 10.0)  # of a bar
+
+
+@dataclasses.dataclass(frozen=True)
+class Outer:
+    """Example.
+
+    Parameters
+    ----------
+    speed_max_mps : float
+        Said by the docstring,
+        in two lines.
+    """
+
+    speed_max_mps: float = number(3.0, 0.0)
+    # Title
+    kind: Literal["a", "b"] = "a"
+    # Above the field stands what it is about.
+    lag_s: float | None = number(None, -1.0, 1.0)
+    inner: Inner = dataclasses.field(default_factory=Inner)
+
+
+def test_a_setting_is_told_with_all_that_the_code_says() -> None:
+    found = {f"{one.table}.{one.key}": one for one in settings_of("outer", Outer)}
+    assert list(found) == ["outer.speed_max_mps", "outer.kind", "outer.lag_s", "outer.inner.width_m"]
+    speed = found["outer.speed_max_mps"]
+    assert (speed.unit, speed.default, speed.allowed) == ("m/s", "3", "0 or more")
+    assert speed.meaning == "Said by the docstring, in two lines."
+    assert (found["outer.kind"].allowed, found["outer.kind"].meaning) == ("a, b", "")
+    assert found["outer.lag_s"].meaning == "Above the field stands what it is about."
+    assert (found["outer.lag_s"].default, found["outer.lag_s"].allowed) == ("", "-1 to 1")
+    assert meanings(Inner) == {"width_m": found["outer.inner.width_m"].meaning} == {"width_m": "of a bar"}
+
+
+def test_defaults_that_are_told_can_be_written_into_a_file() -> None:
+    for analysis in systems().analyses:
+        rows = [one for one in settings_of(analysis.settings_table, analysis.settings) if "." not in one.table]
+        numbers = {one.key: float(one.default) for one in rows if one.default.replace(".", "", 1).isdigit()}
+        whole = {name: int(value) if value.is_integer() else value for name, value in numbers.items()}
+        settings_from(analysis.settings, whole, "told.toml")
+
+
+def test_the_list_is_printed() -> None:
+    code, out, _ = groundstation("list", "--settings")
+    assert code == 0 and "[heading]" in out and "taxi_speed_min_mps" in out
+    code, out, _ = groundstation("list", "--settings", "--json")
+    rows = json.loads(out)
+    assert code == 0 and len(rows) == len(every_setting()) > 500
+    assert {"table", "key", "unit", "default", "allowed", "meaning"} == set(rows[0])
+    assert groundstation("list", "a.csv", "--settings")[0] == 2
