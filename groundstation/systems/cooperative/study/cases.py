@@ -169,8 +169,8 @@ CASES: tuple[PublishedCase, ...] = (
         1.43,
         "no more than 25-30 % better",
         why="A net whose form is known has three unknowns left of 2 k: the bound is "
-        "sqrt(2 k / 3) = 2 for six aircraft. The filter claims a little more than that and is not consistent: 400 runs "
-        "show it, 100 need not.",
+        "sqrt(2 k / 3) = 2 for six aircraft. The filter claims a little more than that and is not consistent: its "
+        "NEES lies above the 95 % limits, which the 99 % limits of this table may hide.",
         verdict="refuted",
     ),
     PublishedCase(
