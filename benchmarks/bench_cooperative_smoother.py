@@ -7,6 +7,12 @@ by gtsam (multifrontal Cholesky, COLAMD), one variable a vehicle and knot, one f
 processor time on one thread for a solution and for a solution with the covariances of all states, and how far they are
 apart. gtsam is no dependency: ``--gtsam`` names the Python of an environment of its own (``python -m venv E; E/bin/pip
 install gtsam``). Building its graph is not timed.
+
+    python benchmarks/bench_cooperative_smoother.py --runs 100 --seed 4711 [--session ...] [--silent 125 375] [--filter]
+
+flies a session many times and prints RMS error and NEES of the smoother over aircraft and time (after the first minute
+too), and the NEES of the first aircraft at start, middle and end with 99 % limits of so many runs; ``--silent``: no
+point is heard between these seconds; ``--filter``: the centralised filter on the same sessions.
 """
 
 import argparse
@@ -134,16 +140,65 @@ def _unit(gtsam: object, n: int) -> object:
     return gtsam.noiseModel.Unit.Create(n)  # type: ignore[attr-defined]
 
 
+def honesty(session: str, runs: int, seed: int, silent: tuple[float, float], algorithm: str) -> None:
+    """Fly a session many times, and print errors and NEES of an algorithm."""
+    from dataclasses import replace
+
+    from groundstation.methods.intervals import nees_limits
+    from groundstation.simulation.session import simulate_session
+    from groundstation.simulation.session_scenario import load_session
+    from groundstation.systems.cooperative.algorithms import run_algorithm
+    from groundstation.systems.cooperative.consistency import normalised
+    from groundstation.systems.cooperative.events import prepare
+    from groundstation.systems.cooperative.study.cases import CASES, settings_of
+
+    scenario = load_session(session)
+    settings = settings_of(scenario, CASES[0])
+    squares, nees, cpu_s = [], [], 0.0
+    for run in range(runs):
+        simulated = simulate_session(scenario, seed, run)
+        table = simulated.session.ranges
+        points = [point.name for point in simulated.session.points]
+        lost = np.isin(table.source, points) & (table.time_s > silent[0]) & (table.time_s < silent[1])
+        prepared = prepare(replace(simulated.session, ranges=table.take(~lost)), settings)
+        start = time.process_time()
+        tracks = run_algorithm(prepared, settings, algorithm).tracks
+        cpu_s += time.process_time() - start
+        error = [
+            track.state[:, :2] - truth.states[np.searchsorted(truth.time_s, track.time_s - 1e-6), :2]
+            for track, truth in zip(tracks, simulated.truth, strict=True)
+        ]
+        squares.append([(one**2).sum(axis=1) for one in error])
+        nees.append([normalised(one, track.horizontal_m2) for one, track in zip(error, tracks, strict=True)])
+    square, ratio, late = np.array(squares), np.array(nees), tracks[0].time_s > 60.0
+    low, high = nees_limits(2, runs, 0.99)
+    first = ratio[:, 0].mean(axis=0)
+    print(
+        f"{session}, {algorithm}, {runs} runs, seed {seed}: RMS {np.sqrt(square.mean()):.2f} m, after the first minute "
+        f"{np.sqrt(square[:, :, late].mean()):.2f} m, NEES {ratio.mean():.2f}; of one aircraft {first[0]:.2f} at the "
+        f"start, {first[len(first) // 2]:.2f} in the middle, {first[-1]:.2f} at the end [{low:.2f}, {high:.2f}]; "
+        f"{cpu_s / runs:.2f} s of processor time a run",
+        flush=True,
+    )
+
+
 def main() -> None:
     """Run both."""
     parser = argparse.ArgumentParser(description="Speed of the session smoother.")
     parser.add_argument("--session", default="local-three-two-points")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--runs", type=int, default=0)
+    parser.add_argument("--silent", type=float, nargs=2, default=(0.0, 0.0))
+    parser.add_argument("--filter", action="store_true")
     parser.add_argument("--gtsam", help="Python of an environment that has gtsam")
     parser.add_argument("--solve", type=Path, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.solve:
         theirs(arguments.solve)
+        return
+    if arguments.runs:
+        for algorithm in ("smoothed", *(("centralised",) if arguments.filter else ())):
+            honesty(arguments.session, arguments.runs, arguments.seed, tuple(arguments.silent), algorithm)
         return
     whole_s, arrays, solve_s, both_s = ours(arguments.session, arguments.seed)
     print(f"smoother, all passes: {whole_s:.3f} s")
