@@ -151,7 +151,7 @@ class CooperativeResult(SessionAnswer):
         ``cooperative_geometry`` (time_s, vehicle, sources, hdop, gdop,
         determinant, eigenvalue, gram_determinant, bound_m), ``cooperative_map`` (time_s, algorithm, spectral_radius),
         ``cooperative_links`` (time_s, receiver, source, innovation, sigma, mark), ``cooperative_traffic`` (algorithm,
-        vehicle, messages, bytes).
+        vehicle, messages, bytes), ``cooperative_stations`` (the rows of ``stations``, where there are any).
     """
 
     analysis: ClassVar[str] = "cooperative"

@@ -71,6 +71,30 @@ class CooperativeTraffic(Arrays, figure="cooperative_traffic"):
     bytes: Counts
 
 
+class CooperativeStations(Arrays, figure="cooperative_stations"):
+    """Ground stations as the session judges them; NaN where there is no such number."""
+
+    station: Texts
+    verdict: Texts
+    ranges: Counts
+    chance: Floats
+    shift_m: Floats
+    shift_sigma_m: Floats
+    shift_direction_deg: Floats
+    delay_m: Floats
+    delay_sigma_m: Floats
+    detectable_best_m: Floats
+    detectable_worst_m: Floats
+    metres_per_metre: Floats
+    moves_most: Texts
+    stated_sigma_m: Floats
+    used_sigma_m: Floats
+    survey_north_m: Floats
+    survey_east_m: Floats
+    survey_sigma_north_m: Floats
+    survey_sigma_east_m: Floats
+
+
 class SessionErrors(Arrays, figure="session_errors"):
     """Worst computed 2 sigma_r and RMS error of all aircraft over time, default algorithm."""
 

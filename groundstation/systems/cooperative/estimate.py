@@ -119,6 +119,7 @@ def estimate_session(
             figures.map_figure([one.run for one in judged]),
             figures.links_figure(prepared, predicting),
             figures.traffic_figure([one.run for one in judged]),
+            *([figures.stations_figure(stations)] if stations else []),
         ),
     )
     return answer, tuple(findings)

@@ -10,6 +10,7 @@ from groundstation.systems.cooperative.arrays import (
     CooperativeGeometry,
     CooperativeLinks,
     CooperativeMap,
+    CooperativeStations,
     CooperativeTracks,
     CooperativeTraffic,
 )
@@ -17,6 +18,7 @@ from groundstation.systems.cooperative.consistency import TrackJudgement
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.geometry import Geometry
 from groundstation.systems.cooperative.loop_types import KINDS, PEER, POINT
+from groundstation.systems.cooperative.stations_answer import StationsAnswer
 from groundstation.systems.cooperative.tracks import AlgorithmRun
 
 
@@ -126,6 +128,14 @@ def _ranges(prepared: Prepared, run: AlgorithmRun) -> tuple[FloatArray, FloatArr
             for rows, sign in ends if state >= 0 and not is_free else ():
                 range_m[rows] += sign * np.interp(at_s[rows], track.time_s, track.state[:, state])
     return range_m, np.where(is_range, np.sqrt(events.variance_m2[event]), np.nan)
+
+
+def stations_figure(stations: StationsAnswer) -> CooperativeStations:
+    """Ground stations as the session judges them."""
+    columns = {name: [getattr(row, name) for row in stations.rows] for name in CooperativeStations.__annotations__}
+    return CooperativeStations(
+        **{name: np.array([np.nan if value is None else value for value in values]) for name, values in columns.items()}
+    )
 
 
 def traffic_figure(runs: Sequence[AlgorithmRun]) -> CooperativeTraffic:

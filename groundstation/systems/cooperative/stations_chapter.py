@@ -37,6 +37,7 @@ DATUM_CAPTION = (
     "Evidence: twice the log of the likelihood ratio against WGS-84; above 12 the datum is told. Could be told: the "
     "session would show it."
 )
+NUMBERS = ("cooperative_stations",)
 TONES: dict[str, Tone] = {"fits": "good", "off": "bad", "one of several": "warn", "left out": "bad"}
 
 
@@ -99,7 +100,7 @@ def _stations(stations: StationsAnswer) -> Grid:
         )
         for row in stations.rows
     ]
-    return Grid("Ground stations", STATION_HEADS, rows, STATION_CAPTION + _tested_with(stations))
+    return Grid("Ground stations", STATION_HEADS, rows, STATION_CAPTION + _tested_with(stations), NUMBERS)
 
 
 def _tested_with(stations: StationsAnswer) -> str:
@@ -115,7 +116,7 @@ def _reliability(stations: StationsAnswer) -> Grid:
         (row.station, _best_to_worst(row), number(row.metres_per_metre, 2), row.moves_most, _surveyed(row))
         for row in stations.rows
     ]
-    return Grid("Errors of stations that stay unseen", RELIABILITY_HEADS, rows, RELIABILITY_CAPTION)
+    return Grid("Errors of stations that stay unseen", RELIABILITY_HEADS, rows, RELIABILITY_CAPTION, NUMBERS)
 
 
 def _with_sigma(value: float | None, sigma: float | None, *, signed: bool = False) -> str:
