@@ -122,3 +122,11 @@ spare_pandas()
 pyarrow.array([1])
 """
     assert loaded(program, names=("pandas",)) == ["pandas"]
+
+
+@pytest.mark.parametrize(("asked", "threads"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "2"}, "2")])
+def test_linear_algebra_has_one_thread_before_numpy_is_loaded(asked: dict[str, str], threads: str) -> None:
+    code = "import groundstation.cli, os, sys; print('numpy' in sys.modules, os.environ['OPENBLAS_NUM_THREADS'])"
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")} | asked
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
+    assert done.stdout.split() == ["False", threads]
