@@ -287,6 +287,7 @@ HDF5 = [  # FlightDataAnalyzer's names and units; the topic's leading parameter 
     *facts(r"raw\.Altitude_STD", "baro", pressure_altitude_m=("value", FOOT)),
     *facts(r"raw\.Altitude_AAL", "baro", height_above_airfield_m=("value", FOOT)),
     *facts(r"raw\.Airspeed", "air", indicated_airspeed_mps=("value", KNOT)),
+    *facts(r"raw\.Eng_\d_N1", "engine", n1_share=("value", 0.01)),
     *facts(r"raw\.ILS_Localizer", "guidance", lateral_deviation_dots=("value", -1.0)),
 ]
 # Garmin G1000: raw keeps what is not mapped, so the file itself is the raw side. Cells by names of the third line.
@@ -297,6 +298,7 @@ G1000: Mapping[str, tuple[str, float]] = {
     "gnss.altitude_msl_m": ("AltMSL", FOOT),
     "gnss.ground_speed_mps": ("GndSpd", KNOT),
     "gnss.velocity_down_mps": ("VSpdG", -FOOT / 60.0),
+    "engine.1.power_share": ("E1 %Pwr", 1.0),
     "ins.pitch_deg": ("Pitch", 1.0),
     "ins.roll_deg": ("Roll", 1.0),
     "ins.magnetic_heading_deg": ("HDG", 1.0),

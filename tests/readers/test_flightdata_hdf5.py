@@ -97,6 +97,28 @@ def test_gear_of_one_side_and_a_wheel_serve_where_there_is_no_common_one(tmp_pat
     assert log.values("discrete.wheel", "wheel_speed_mps")[0] == pytest.approx(100.0 * MPS_PER_KNOT)
 
 
+def test_flaps_legs_fans_and_wind(tmp_path: Path) -> None:
+    parameters = {
+        "Airspeed": ramp(130.0, 0.0, units="kts"),
+        "Wind Direction": ramp(270.0, 0.0, frequency=0.25, units="deg"),
+        "Wind Speed": ramp(20.0, 0.0, frequency=0.25, units="kts"),
+        "Flap (L)": ramp(30.0, 0.0, frequency=0.5, units="deg"),
+        "Gear (N) Down": ramp(1.0, 0.0, frequency=0.25),
+        "Gear (L) Down": ramp(0.0, 0.0, frequency=0.25),
+        "Eng (2) N1": ramp(43.0, 0.0, units="%"),
+    }
+    log = Read(write_flightdata(tmp_path / "log.h5", parameters))
+    assert log.values("air", "wind_east_mps")[0] == pytest.approx(20.0 * MPS_PER_KNOT)  # it blows from the west
+    assert log.values("air", "wind_north_mps")[0] == pytest.approx(0.0, abs=1e-9)
+    assert log.values("configuration", "flap_deg")[0] == 30.0
+    assert log.values("configuration", "gear_nose_down")[0] == 1.0
+    assert log.values("configuration", "gear_left_down")[0] == 0.0
+    assert log.values("engine.2", "n1_share")[0] == pytest.approx(0.43)
+    parameters["Flap (L)"] = ramp(30.0, 0.0, frequency=0.5, units="furlong")
+    path = write_flightdata(tmp_path / "odd.h5", parameters)
+    assert "flap_deg" not in fields(Read(path), "configuration") and "is in furlong" in texts(path)
+
+
 def test_contract_in_slices(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = plain(tmp_path / "log.hdf5")
     whole = list(registry.read(path))

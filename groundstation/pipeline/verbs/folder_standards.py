@@ -3,11 +3,12 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.base.errors import GroundstationError, SettingsError, UsageError
 from groundstation.base.failures import gathered_failures
 from groundstation.base.shipped_toml import SUFFIX, ShippedToml, TomlFile
 from groundstation.pipeline.many_flights.inputs import saved_flights
 from groundstation.pipeline.one_flight.identity import safe_part
+from groundstation.pipeline.verbs.acceptance import STANDARDS
 from groundstation.reports.flight_report import flight_report_html, write_pages
 from groundstation.results.files import SavedFlight, csv_text, json_text, load, write_text
 from groundstation.systems import systems
@@ -37,12 +38,15 @@ def standard_of(name_or_path: str) -> ChosenStandard | None:
     Raises
     ------
     SettingsError
-        For a file that cannot be read.
+        For an unknown name, or a file that cannot be read.
     """
     for one in systems().folder_standards:
         if name_or_path.lower() in one.shipped.names():
             return ChosenStandard(one, one.shipped.read(name_or_path))
     if not name_or_path.endswith(SUFFIX):
+        names = (*STANDARDS.names(), *(name for one in systems().folder_standards for name in one.shipped.names()))
+        if name_or_path.lower() not in names:
+            raise SettingsError("standard", repr(name_or_path), f"a file *{SUFFIX} or one of {', '.join(names)}")
         return None
     file = ShippedToml("groundstation", "", "standard").read(name_or_path)
     kind = file.table.get("kind")

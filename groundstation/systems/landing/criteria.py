@@ -27,6 +27,7 @@ FLARE_M, FLOAT_M = 50.0 * M_PER_FOOT, 20.0 * M_PER_FOOT
 # Landing distance available (m) up to which the aiming point begins so far behind the threshold (m).
 # Source: ICAO Annex 14, volume I, table 5-1.
 AIMING_POINTS = ((800.0, 150.0), (1_200.0, 250.0), (2_400.0, 300.0), (math.inf, 400.0))
+LEAST_WIND_S = 20.0
 NOT_LOGGED = "not in the log"
 NO_THRESHOLD = "the threshold is placed by the positions themselves"
 
@@ -188,9 +189,15 @@ def _thrust(seen: _Seen) -> _Value:
 
 
 def _wind(seen: _Seen) -> dict[str, _Value]:
-    """Mean wind from the lower check height to the end, from behind and across."""
+    """Mean wind from the lower check height to the end, from behind and across.
+
+    Of a go-around above that height, over the last ``LEAST_WIND_S``.
+    """
     own = rows_below(seen.relative, seen.settings.gate_low_m, -math.inf)
-    rows = slice(seen.relative.rows.start + own.start, min(seen.relative.rows.start + own.stop, seen.final.last))
+    last = min(seen.relative.rows.start + own.stop, seen.final.last)
+    late = int(np.searchsorted(seen.path.time_s[:last], seen.path.time_s[last - 1] - LEAST_WIND_S))
+    first = max(min(seen.relative.rows.start + own.start, late), seen.relative.rows.start)
+    rows = slice(first, last)
     north, east = seen.logged.wind_north_mps[rows], seen.logged.wind_east_mps[rows]
     known = np.isfinite(north) & np.isfinite(east)
     if not known.any():
@@ -199,13 +206,12 @@ def _wind(seen: _Seen) -> dict[str, _Value]:
     behind = float(np.mean(north[known]) * math.cos(course) + np.mean(east[known]) * math.sin(course))
     aside = float(np.mean(east[known]) * math.cos(course) - np.mean(north[known]) * math.sin(course))
     by, sigma = seen.logged.sources.get("wind", ""), seen.settings.wind_sigma_mps
-    what = "mean from the lower check height down"
-    if seen.logged.wind_is_derived:
-        what = f"{what}; from motion over the ground and through the air"
-    at = place_at(seen.path, seen.relative, own.start)
+    what = "ground less air motion" if seen.logged.wind_is_derived else ""
+    side = f"from the {'left' if aside > 0.0 else 'right'}"
+    at = place_at(seen.path, seen.relative, first - seen.relative.rows.start)
     return {
-        "tailwind": _Value(behind, sigma, at, by, what + ("; headwind negative" if behind < 0.0 else "")),
-        "crosswind": _Value(abs(aside), sigma, at, by, f"{what}; from the {'left' if aside > 0.0 else 'right'}"),
+        "tailwind": _Value(behind, sigma, at, by, what),
+        "crosswind": _Value(abs(aside), sigma, at, by, "; ".join(filter(None, (what, side)))),
     }
 
 

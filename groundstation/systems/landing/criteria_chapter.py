@@ -100,7 +100,8 @@ def _rest(one: Approach) -> Grid | None:
         rows += _not_logged(lacking, reason)
     caption = (
         "±: 95 %, where the value has an uncertainty; undecided: it reaches over the limit. No limit: that of "
-        f"the type or the operator, set in [landing.criteria]. {EDITIONS}"
+        "the type or the operator, set in [landing.criteria]. Wind: mean from the lower check height, a headwind is "
+        f"a negative tailwind. {EDITIONS}"
     )
     return Grid(f"Approach {one.number}: wind, thrust, threshold and landing", HEADS, rows, caption)
 
