@@ -1,4 +1,4 @@
-"""Every setting of a user's file: its table, unit, default, range and meaning, read from the code itself."""
+"""Settings of a user's file with unit, default, range and meaning, read from the code."""
 
 import dataclasses
 import inspect
@@ -59,7 +59,7 @@ def every_setting() -> tuple[Setting, ...]:
 
 
 def settings_of(table: str, kind: type) -> Iterator[Setting]:
-    """Yield the settings of a dataclass as a table, those of dataclasses inside as tables below it.
+    """Yield the settings of a dataclass as a table, those of dataclasses inside below it.
 
     Examples
     --------
@@ -90,7 +90,7 @@ def settings_of(table: str, kind: type) -> Iterator[Setting]:
 
 
 def meanings(kind: type) -> Mapping[str, str]:
-    """Return what the code says of each field: in the docstring, else behind the field, else above it."""
+    """Return the meaning of each field: of the docstring, else behind it, else above it."""
     found = {name: text for one in reversed(kind.__mro__[:-1]) for name, text in _of_comments(one).items()}
     for one in reversed(kind.__mro__[:-1]):
         found |= _of_docstring(inspect.cleandoc(one.__doc__ or ""))
@@ -111,7 +111,8 @@ def _of_comments(kind: type) -> dict[str, str]:
         lines = inspect.getsource(kind)
     except (OSError, TypeError):
         return {}
-    found: dict[str, str] = {}
+    behind: dict[str, str] = {}
+    over: dict[str, str] = {}
     above: list[str] = []
     name, last_row = "", 0
     for token in tokenize.generate_tokens(StringIO(inspect.cleandoc(lines)).readline):
@@ -120,21 +121,21 @@ def _of_comments(kind: type) -> dict[str, str]:
             above = [*above, token.string.lstrip("# ")] if token.line[:4].isspace() else []
             name = ""
         elif token.type == tokenize.COMMENT and name:
-            found[name] = " ".join(filter(None, (found.get(name, ""), token.string.lstrip("# "))))
+            behind[name] = " ".join(filter(None, (behind.get(name, ""), token.string.lstrip("# "))))
         elif token.type == tokenize.NAME and token.start[1] == 4 and re.match(r"\s{4}\w+\s*:", token.line):
             name = token.string
             if above and len(" ".join(above).split()) >= FEWEST_WORDS:
-                found[name] = " ".join(above)
+                over[name] = " ".join(above)
             above = []
         elif token.type == tokenize.NL and not token.line.strip():
             above = []
         if token.type == tokenize.NEWLINE:
             last_row = token.end[0]
-    return found
+    return over | behind
 
 
 def _dataclass_in(hint: Any) -> type | None:
-    """Return the dataclass that a field holds; None for numbers, words, lists and unions of several."""
+    """Return the dataclass that a field holds; None for a number, word, list or union."""
     options = [one for one in _members(hint) if one is not type(None)]
     return options[0] if len(options) == 1 and dataclasses.is_dataclass(options[0]) else None  # type: ignore[return-value]
 

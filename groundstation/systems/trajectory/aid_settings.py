@@ -24,10 +24,17 @@ class AidSettings:
     barometer_topic: str = ""
     wheel_topic: str = ""
     compass_topic: str = ""
-    stuck_s: float = number(30.0, 2.0, 3600.0)  # one height for so long, while GNSS climbs, is stuck
-    stuck_climb_m: float = number(8.0, 0.1, 1000.0)  # it climbs more than that, and than 4 sigmas of it
-    scale_limit: float = number(0.15, 0.01, 1.0)  # of barometric height beside GNSS: beyond it the unit is another
-    jump_m: float = number(8.0, 0.5, 1000.0)  # that stays, while GNSS and its velocity show none
-    nis_max: float = number(2.0, 1.0, 100.0)  # mean squared innovation over what is expected
-    used_share_min: float = number(0.9, 0.0, 1.0)  # of its readings; the gate kept the others out
-    heading_sigmas: float = number(3.0, 1.0, 100.0)  # magnetic heading from that of the motion
+    # A barometer that shows one height for so long, while GNSS climbs, is stuck; chosen.
+    stuck_s: float = number(30.0, 2.0, 3600.0)
+    # Climb of GNSS that a stuck barometer does not show, at least; 4 sigmas of GNSS where those are more; chosen.
+    stuck_climb_m: float = number(8.0, 0.1, 1000.0)
+    # A barometric height whose scale beside GNSS is farther from 1 has another unit; chosen.
+    scale_limit: float = number(0.15, 0.01, 1.0)
+    # A larger jump of the barometric height that stays, and that GNSS does not show, leaves the barometer out; chosen.
+    jump_m: float = number(8.0, 0.5, 1000.0)
+    # Mean squared innovation of an aid over what is expected at most, else it is left out; chosen.
+    nis_max: float = number(2.0, 1.0, 100.0)
+    # Share of the readings of an aid that the gate let in at least, else it is left out; chosen.
+    used_share_min: float = number(0.9, 0.0, 1.0)
+    # A magnetic heading farther from that of the motion, in sigmas, is left out; chosen.
+    heading_sigmas: float = number(3.0, 1.0, 100.0)
