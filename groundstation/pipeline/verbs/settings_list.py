@@ -1,4 +1,4 @@
-"""Settings of a user's file with unit, default, range and meaning, read from the code."""
+"""Settings of a user's file as the code tells them: unit, default, range, meaning."""
 
 import dataclasses
 import inspect

@@ -139,15 +139,17 @@ def serials_of(text: str) -> tuple[tuple[float, str], ...]:
     ((0.0, 'HG2001, rev B'), (5400.0, 'B07'))
     """
     found: list[tuple[float, str]] = []
-    for part in filter(None, (one.strip() for one in text.split(","))):
-        told = SERIAL_FROM.match(part)
+    for part in text.split(","):
+        if not part.strip():
+            continue
+        told = SERIAL_FROM.match(part.strip())
         if told is not None:
             found.append((float(told["from_s"]), told["serial"]))
         elif found:
             at_s, serial = found[-1]
-            found[-1] = at_s, f"{serial}, {part}"
+            found[-1] = at_s, f"{serial},{part.rstrip()}"
         else:
-            found.append((0.0, part))
+            found.append((0.0, part.strip()))
     ordered = sorted(found, key=lambda one: one[0])
     return tuple(one for before, one in pairwise([(-1.0, ""), *ordered]) if one[1] != before[1])
 
