@@ -47,9 +47,10 @@ def stations_warning(answer: CooperativeResult) -> str:
     if stations is None:
         return ""
     said = []
-    told = [row.datum for row in stations.datums if row.is_told]
+    told = sorted((row for row in stations.datums if row.is_told), key=lambda row: -row.evidence)
     if told:
-        said.append(f"Stations look to be in {' or '.join(told)}, not in WGS-84.")
+        names = " or ".join(row.datum for row in told)
+        said.append(f"Stations look to be in {names}, not in WGS-84; the answer takes them as {told[0].datum}.")
     for row in stations.with_verdict("off"):
         said.append(
             f"Station {row.station} is {_size(row)} off its place in the stations file; the answer takes its place as "

@@ -150,7 +150,11 @@ def test_ins_worse_than_believed_is_taken_as_it_is_and_accuses_no_station() -> N
 
 
 def test_stations_in_another_datum_are_told_where_the_ins_is_good_enough() -> None:
-    _, judgement, _ = judged("two-datum")
+    _, judgement, wrong = judged("two-datum")
+    assert judgement.doubts == ()
+    for station, before in enumerate(drawn(BY_NAME["two-datum"], SEED, 0)[1].points):
+        taken = np.array(judgement.session.points[station].position_m) - before.position_m
+        assert taken[:2] == pytest.approx(-wrong[station], abs=3.0)  # SK-95 lies 2 m from SK-42
     assert [one.name for one in judgement.datums if one.is_told][:1] == ["SK-42"]
     _, poor, _ = judged("two-datum-poor")
     assert {one.name for one in poor.datums} == {"SK-42", "SK-95", "ED50"}

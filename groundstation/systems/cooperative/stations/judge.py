@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.base.datums import DATUMS
-from groundstation.base.ecef import geodetic_deg_m
+from groundstation.base.datums import BY_NAME, DATUMS
+from groundstation.base.ecef import ecef_from_n, geodetic_deg_m
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.settings import CooperativeSettings
@@ -164,6 +164,11 @@ def judge_stations(session: Session, settings: CooperativeSettings) -> StationJu
     now, doubts = session, list[Doubt]()
     found = station_tests(information, range(len(session.points)))
     first, tests, datums = information, found, datum_tests(session, information, found)
+    told = max((one for one in datums if one.is_told), key=lambda one: one.statistic, default=None)
+    if told is not None:
+        now = _in_datum(session, told.name)
+        information, solved, _ = station_information(now, raised)
+        found = tests = station_tests(information, range(len(session.points)))
     for number in range(MOST_ROUNDS):
         if not alarms(found):
             break
@@ -259,6 +264,18 @@ def datum_tests(
         )
         for name, largest, gain, power in rows
     )
+
+
+def _in_datum(session: Session, name: str) -> Session:
+    """Return the session with stations whose places were in a datum, taken for WGS-84."""
+    points = []
+    for point in session.points:
+        place = _place_deg(session, point)
+        assert place is not None  # else no datum was asked
+        axes = np.eye(3)[:, :2] if session.frame == "local" else ecef_from_n(*place)[:, :2]
+        x, y, z = (np.array(point.position_m) - axes @ BY_NAME[name].error_m(*place)).tolist()
+        points.append(replace(point, position_m=(x, y, z)))
+    return replace(session, points=tuple(points))
 
 
 def _place_deg(session: Session, point: GroundPoint) -> tuple[float, float] | None:

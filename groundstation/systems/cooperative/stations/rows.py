@@ -37,7 +37,7 @@ def with_stations_judged(prepared: Prepared, settings: CooperativeSettings) -> t
         return prepared, None
     judgement = judge_stations(prepared.session, settings)
     answer = stations_answer(judgement, prepared.session, prepared.session.names)
-    if judgement.doubts:
+    if judgement.session is not prepared.session:
         prepared = replace(prepare(judgement.session, settings), findings=prepared.findings)
     return prepared, answer
 
@@ -58,11 +58,12 @@ def stations_answer(judgement: StationJudgement, session: Session, vehicles: Seq
 def station_findings(answer: StationsAnswer) -> tuple[Finding, ...]:
     """Return findings on stations in doubt."""
     found = []
-    told = [row.datum for row in answer.datums if row.is_told]
+    told = sorted((row for row in answer.datums if row.is_told), key=lambda row: -row.evidence)
     if told:
+        names = " or ".join(row.datum for row in told)
         text = (
-            f"stations look to be in {' or '.join(told)}: write datum = {told[0]!r} on top of the stations file; "
-            + _unknown(answer.rows)
+            f"stations look to be in {names}, not in WGS-84; the answer takes them as {told[0].datum}: write "
+            f'datum = "{told[0].datum}" on top of the stations file if they are'
         )
         found.append(Finding("warn", "cooperative.station_datum", text))
     for row in answer.with_verdict("off"):

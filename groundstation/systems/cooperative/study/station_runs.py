@@ -144,7 +144,7 @@ def fly_stations(case: StationCase, seed: int, run: int) -> StationRun:
     doubted = {doubt.station: doubt for doubt in judgement.doubts}
     before, nees, sizes = _errors(simulated, session, settings)
     after = before
-    if judgement.doubts:
+    if judgement.session is not session:
         after, nees, sizes = _errors(simulated, judgement.session, settings)
     levels = [judgement.protection_m(vehicle)[0] for vehicle in range(len(sizes))]
     last = len(session.points) - len(case.points) - 1
