@@ -229,11 +229,22 @@ def test_a_minute_of_a_recorded_set(tmp_path: Path) -> None:
         (tmp_path / path.stem).write_text("\n".join([*kept, ""]))
     (found,) = recorded_sets(tmp_path)
     assert found.sessions[0].names == ("R1", "R2", "R3", "R4", "R5") and len(found.sessions[0].points) == 15
-    names = ("dead_reckoning", "centralised", "split_intersection")
+    names = ("dead_reckoning", "centralised", "split_intersection", "smoothed")
     (table,) = study_recorded([found], algorithms=names).tables
     rms = dict(zip(zip(table["case"].tolist(), table["algorithm"].tolist(), strict=True), table["rms_m"], strict=True))
     nees = table["nees"][table["algorithm"] == "centralised"]
     for case in found.cases():
-        assert rms[case, "centralised"] < 0.1 < rms[case, "dead_reckoning"]
+        assert rms[case, "smoothed"] < rms[case, "centralised"] < 0.1 < rms[case, "dead_reckoning"]
         assert rms[case, "split_intersection"] < rms[case, "dead_reckoning"]
     assert (nees < 3.0).all() and SETTINGS["utias"].camera.lag_s > 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.real_log
+def test_the_smoother_on_set_6() -> None:
+    """Over the time that all truths have in common; no parameter of a single robot was found with the truth."""
+    sets = recorded_sets(real_log("cooperative/utias_mrclam6"))
+    (table,) = study_recorded(sets, algorithms=("smoothed",)).tables
+    for case, limit_m in (("full map", 0.042), ("R3, R4, R5 blind", 0.055)):
+        (row,) = np.flatnonzero(table["case"] == case)
+        assert table["common_m"][row] < limit_m and 1.0 < table["common_nees"][row] < 2.5
