@@ -16,10 +16,11 @@ from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.smoother.chain import add_blocks, turned, updated
 from groundstation.systems.cooperative.smoother.knots import Knots
 from groundstation.systems.cooperative.smoother.layout import Layout
-from groundstation.systems.cooperative.smoother.rows import Rows
+from groundstation.systems.cooperative.smoother.rows import Linearised, Rows
 from groundstation.systems.cooperative.vehicles import PATIENCE
 
-MOST_PASSES = 6
+MOST_TRIMMED, TRIMMED = 10, 2.0  # rounds; medians beyond which a reading is left out
+MOST_PASSES = 12  # one time of leaps more in each
 Doubts = dict[tuple[int, int], int]  # vehicles opened at a knot, and how often
 
 
@@ -38,10 +39,11 @@ def first_pass(
     doubts: Doubts = {}
     for _ in range(MOST_PASSES):
         x, found = _Pass(prepared, layout, rows, settings, doubts).run(len(knots.time_s))
-        fresh = {key: 1 for key in found if key not in doubts}
+        fresh = set(found) - doubts.keys()
         if not fresh:
             break
-        doubts = {**doubts, **fresh}
+        first = min(knot for knot, _ in fresh)  # what is rejected later may be because of it
+        doubts = {**doubts, **{(knot, vehicle): 1 for knot, vehicle in fresh if knot == first}}
     return FirstPass(x, doubts)
 
 
@@ -83,14 +85,9 @@ class _Pass:
                 seen = rows.linearise(m[None], knot, knot + 1)
                 passes = self._judged(seen.residual, seen.values, P, part)
                 self._count(passes, part, knot)
-                m_off, P, _ = updated(
-                    np.zeros(layout.size),
-                    P,
-                    rows.columns[part][passes],
-                    seen.values[passes],
-                    seen.residual[passes],
-                    1.0 / rows.variance[part][passes],
-                )
+                if knot in self._at_doubt:
+                    passes = self._agreeing(seen, P, part, passes)
+                m_off, P = self._updated(seen, P, part, passes)
                 m = m + m_off
             x[knot] = m
         return x, self._found
@@ -120,6 +117,40 @@ class _Pass:
             with np.errstate(invalid="ignore"):
                 passes &= residual**2 <= gate**2 * total
         return passes
+
+    def _updated(self, seen: Linearised, P: FloatArray, part: slice, kept: BoolArray) -> tuple[FloatArray, FloatArray]:
+        """Return the step by the rows that are kept, and the covariance behind it."""
+        rows = self._rows
+        step, after, _ = updated(
+            np.zeros(self._layout.size),
+            P,
+            rows.columns[part][kept],
+            seen.values[kept],
+            seen.residual[kept],
+            1.0 / rows.variance[part][kept],
+        )
+        return step, after
+
+    def _agreeing(self, seen: Linearised, P: FloatArray, part: slice, passes: BoolArray) -> BoolArray:
+        """Return the rows that agree with one another where a clock or a place is open.
+
+        Readings of one knot lie on both sides of a leap. What is open fits none of them, until the fewer are left out:
+        those far beyond the median, again and again.
+        """
+        rows, kept = self._rows, passes.copy()
+        sigma = np.sqrt(rows.variance[part] * rows.spread[part])
+        for _ in range(MOST_TRIMMED):
+            if not kept.any():
+                return passes
+            step, _after = self._updated(seen, P, part, kept)
+            padded = np.concatenate([step, [0.0]])
+            left = np.abs(seen.residual - (seen.values * padded[rows.columns[part]]).sum(axis=1)) / sigma
+            limit = max(self._settings.gate_sigma, TRIMMED * float(np.median(left[kept])))
+            agreeing = passes & (left <= limit)
+            if (agreeing == kept).all():
+                break
+            kept = agreeing
+        return kept
 
     def _count(self, passes: BoolArray, part: slice, knot: int) -> None:
         """Count rejections of each vehicle in a row."""
