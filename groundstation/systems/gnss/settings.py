@@ -14,33 +14,54 @@ class GnssSettings:
     warns and below 5 fails, the largest HDOP above 3 warns and above 10 fails.
     """
 
-    gap_steps: float = number(3.0, 1.5, 100.0)  # a step longer than so many usual ones is a gap
-    gap_min_s: float = number(0.5, 0.0, 60.0)  # a shorter step never is one
-    lost_share_warn: float = number(0.02, 0.0, 1.0)  # share of time without a fix after the first one
+    gap_steps: float = number(3.0, 1.5, 100.0)  # a step of time longer than so many usual ones is a gap; chosen
+    gap_min_s: float = number(0.5, 0.0, 60.0)  # a shorter step of time never is a gap; chosen
+    # Share of the time without a fix after the first one that is worth a warning; chosen.
+    lost_share_warn: float = number(0.02, 0.0, 1.0)
+    # Share of the time without a fix after the first one that is bad; chosen.
     lost_share_bad: float = number(0.2, 0.0, 1.0)
+    # A later first fix, from the start of the log, is worth a warning; chosen.
     first_fix_warn_s: float = number(120.0, 0.0, 3600.0)
-    rtk_lost_share_warn: float = number(0.2, 0.0, 1.0)  # share of time short of a fixed solution that was had
+    # Share of the time without a fixed RTK solution, where one was had, that is worth a warning; chosen.
+    rtk_lost_share_warn: float = number(0.2, 0.0, 1.0)
+    # Fewer satellites are worth a warning, where they are so for geometry_share_warn of the time; ArduPilot
+    # LogAnalyzer.
     satellites_warn: float = number(6.0, 0.0, 100.0)
+    # Fewer satellites are bad, where they are so for geometry_share_bad of the time; ArduPilot LogAnalyzer.
     satellites_bad: float = number(5.0, 0.0, 100.0)
+    # A larger HDOP is worth a warning, where it is so for geometry_share_warn of the time; ArduPilot LogAnalyzer.
     hdop_warn: float = number(3.0, 0.0, 100.0)
+    # A larger HDOP is bad, where it is so for geometry_share_bad of the time; ArduPilot LogAnalyzer.
     hdop_bad: float = number(10.0, 0.0, 100.0)
-    geometry_share_warn: float = number(0.05, 0.0, 1.0)  # share of time beyond a limit that counts
-    geometry_share_bad: float = number(0.2, 0.0, 1.0)  # share of time beyond ``*_bad``
-    age_warn_s: float = number(30.0, 0.0, 3600.0)  # corrections older than so
-    still_mps: float = number(0.15, 0.01, 5.0)  # mean speed over ``still_window_s`` of what stands
-    still_window_s: float = number(5.0, 1.0, 60.0)
+    # Share of the time beyond a limit of satellites or HDOP, in 2D or without integrity that is worth a warning;
+    # chosen.
+    geometry_share_warn: float = number(0.05, 0.0, 1.0)
+    # Share of the time beyond a limit of satellites or HDOP that is bad; chosen.
+    geometry_share_bad: float = number(0.2, 0.0, 1.0)
+    age_warn_s: float = number(30.0, 0.0, 3600.0)  # older corrections are worth a warning; chosen
+    # The receiver stands while its mean speed over still_window_s is lower; chosen.
+    still_mps: float = number(0.15, 0.01, 5.0)
+    still_window_s: float = number(5.0, 1.0, 60.0)  # time over which velocity is averaged to tell a standstill; chosen
+    # Shortest standstill by which claimed accuracy is judged; chosen.
     standstill_min_s: float = number(10.0, 2.0, 3600.0)
-    standstill_guard_s: float = number(2.0, 0.0, 60.0)  # left out at either end
+    standstill_guard_s: float = number(2.0, 0.0, 60.0)  # left out at either end of a standstill; chosen
+    # Fewest samples of a standstill by which claimed accuracy is judged; chosen.
     standstill_samples_min: int = number(10, 3, 100_000)
-    too_sure: float = number(2.0, 1.0, 100.0)  # times the claimed sigma: more scatter than that is a warning
-    jump_min_m: float = number(2.0, 0.0, 1000.0)  # a smaller step of the position is none
-    jump_min_rtk_m: float = number(0.3, 0.0, 1000.0)  # the same between solutions by carrier phase
-    jump_sigmas: float = number(8.0, 3.0, 100.0)  # of the usual difference between position and velocity
-    stamp_jitter_s: float = number(0.05, 0.0, 10.0)  # of time stamps: less along the motion is no jump
-    velocity_apart_mps: float = number(3.0, 0.1, 1000.0)  # RMS: velocity and position tell different motions
-    moving_mps: float = number(2.0, 0.1, 100.0)  # from here on a track tells where the vehicle points
-    lag_sigma_max_s: float = number(0.05, 0.001, 10.0)  # a delay known less well is not told
-    pair_seconds_min: float = number(5.0, 0.0, 3600.0)  # two receivers must be there together for so long
+    # Scatter at standstill over the claimed sigma that is worth a warning; chosen.
+    too_sure: float = number(2.0, 1.0, 100.0)
+    jump_min_m: float = number(2.0, 0.0, 1000.0)  # a smaller step of the position is no jump; chosen
+    # A smaller step of the position between solutions by carrier phase is no jump; chosen.
+    jump_min_rtk_m: float = number(0.3, 0.0, 1000.0)
+    # A jump is more than so many usual differences between position and velocity; chosen.
+    jump_sigmas: float = number(8.0, 3.0, 100.0)
+    # Jitter of time stamps: what it makes of the speed along the motion is no jump; chosen.
+    stamp_jitter_s: float = number(0.05, 0.0, 10.0)
+    # RMS difference of velocity and change of position that is worth a warning; chosen.
+    velocity_apart_mps: float = number(3.0, 0.1, 1000.0)
+    moving_mps: float = number(2.0, 0.1, 100.0)  # at a higher speed the track tells where the vehicle points; chosen
+    lag_sigma_max_s: float = number(0.05, 0.001, 10.0)  # a delay whose sigma is larger is not told; chosen
+    # Two receivers are compared where both are there for so long; chosen.
+    pair_seconds_min: float = number(5.0, 0.0, 3600.0)
 
     def __post_init__(self) -> None:
         check_ranges(self)
