@@ -12,12 +12,13 @@ class LandingBeaconsSettings:
     Parameters
     ----------
     bearing_sigma_deg : float
-        Of a relative bearing; 2 to 3 degrees are usual for an automatic direction finder.
+        Sigma of a relative bearing; 2 to 3 degrees are usual for an automatic direction finder.
     height_sigma_m : float
-        Of the radio altitude.
+        Sigma of the radio altitude.
     highest_m : float
         Radio altitude above which nothing is an approach.
     shortest_s : float
+        Shortest flight below ``highest_m``, with bearings of all beacons, that is an approach.
     largest_gap_s : float
         Longest step between two samples that is interpolated over.
     silence_ratio : float
