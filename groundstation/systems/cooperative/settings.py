@@ -26,19 +26,20 @@ class InsBelief:
     frame: 7 states, ``velocity_s`` counts.
     """
 
-    position_m: float = number(300.0, 0.0)
-    velocity_mps: float = number(0.2, 0.0)
-    velocity_s: float = number(1000.0, 1.0)
+    position_m: float = number(300.0, 0.0)  # sigma of the dead-reckoned position at the start, north and east
+    velocity_mps: float = number(0.2, 0.0)  # sigma of the velocity error, north and east
+    velocity_s: float = number(1000.0, 1.0)  # correlation time of the velocity error; in the local frame alone
+    # Sigma of either tilt of the platform at the start; in the global frame alone.
     tilt_arcsec: float = number(4.0, 0.0)
-    azimuth_arcmin: float = number(5.0, 0.0)
-    gyro_dph: float = number(0.01, 0.0)
-    gyro_s: float = number(3600.0, 1.0)
-    baro_m: float = number(10.0, 0.0)
-    baro_s: float = number(3600.0, 1.0)
-    clock_m: float = number(30.0, 0.0)
-    clock_mps: float = number(3.0, 0.0)
-    clock_s: float = number(3600.0, 1.0)
-    has_separate_clocks: bool = False
+    azimuth_arcmin: float = number(5.0, 0.0)  # sigma of the azimuth error at the start; in the global frame alone
+    gyro_dph: float = number(0.01, 0.0)  # sigma of the drift of each gyro; in the global frame alone
+    gyro_s: float = number(3600.0, 1.0)  # correlation time of the drift of a gyro; in the global frame alone
+    baro_m: float = number(10.0, 0.0)  # sigma of the error of barometric height
+    baro_s: float = number(3600.0, 1.0)  # correlation time of the error of barometric height
+    clock_m: float = number(30.0, 0.0)  # sigma of the clock error at the start, times the speed of light
+    clock_mps: float = number(3.0, 0.0)  # sigma of the rate of the clock, times the speed of light
+    clock_s: float = number(3600.0, 1.0)  # correlation time of the rate of the clock
+    has_separate_clocks: bool = False  # true: the satellite receiver has a clock of its own beside that of the link
 
     def __post_init__(self) -> None:
         check_ranges(self)
@@ -52,14 +53,15 @@ class OdometryBelief:
     noise along and across in proportion to the way. Scale states exist where their sigma is above 0.
     """
 
-    position_m: float = number(0.05, 0.0)
-    heading_deg: float = number(2.0, 0.0)
-    along_m_per_sqrt_s: float = number(0.02, 0.0)
-    turn_deg_per_sqrt_s: float = number(2.0, 0.0)
+    position_m: float = number(0.05, 0.0)  # sigma of the position at the start, along either axis
+    heading_deg: float = number(2.0, 0.0)  # sigma of the heading at the start
+    along_m_per_sqrt_s: float = number(0.02, 0.0)  # noise of the way by speed, as a random walk over one second
+    turn_deg_per_sqrt_s: float = number(2.0, 0.0)  # noise of the heading by turn rate, as a random walk over one second
+    # Noise of the position along and across, as a random walk over one metre of way.
     slip_m_per_sqrt_m: float = number(0.0, 0.0)
-    speed_scale: float = number(0.0, 0.0, 1.0)
-    turn_scale: float = number(0.0, 0.0, 1.0)
-    scale_s: float = number(1e6, 1.0)
+    speed_scale: float = number(0.0, 0.0, 1.0)  # sigma of the scale of the speed; 0: no such state
+    turn_scale: float = number(0.0, 0.0, 1.0)  # sigma of the scale of the turn rate; 0: no such state
+    scale_s: float = number(1e6, 1.0)  # correlation time of both scales
 
     def __post_init__(self) -> None:
         check_ranges(self)
@@ -74,12 +76,13 @@ class CameraBelief:
     Parameters
     ----------
     range_scale : float
+        Sigma of the scale of its ranges; 0: no such state.
     marker_bias_m : float
-        Of ranges to vehicles, beside the range bias of all.
+        Sigma of a bias of ranges to vehicles, beside the range bias of all; 0: no such state.
     mount_deg : float
-        Angle from the nose to the optical axis.
+        Sigma of the angle from the nose to the optical axis; 0: no such state.
     lag_s : float
-        How much later than it was taken a measurement is stamped.
+        Sigma of how much later than it was taken a measurement is stamped; 0: no such state.
     """
 
     range_scale: float = number(0.0, 0.0, 1.0)
@@ -105,6 +108,7 @@ class SmootherSettings:
     pair_bias_m : float
         Sigma of a constant bias of the ranges of each pair of vehicles; 0: no such states.
     most_passes : int
+        Passes of the least squares at most; one that still moved the answer is told.
     """
 
     robust_sigmas: float = number(2.385, 0.0, 100.0)
@@ -139,13 +143,14 @@ class CooperativeSettings:
     lever_arm_m : float
         Sigma of an unknown lever arm (forward, right) of each aircraft's antenna; 0: no such states.
     output_step_s : float
+        Step in which every vehicle's states are given.
     map_window_s : float
         Length of the stretches whose joint error map is judged; 0: none is, which leaves out work that grows with the
         number of vehicles.
     extra_range_sigma_m : float
         Added to the stated sigma of peer ranges, in squares: what the stated one leaves out.
     range_share : float
-        Likewise of all ranges over the link, in proportion to the range.
+        Added to the stated sigma of all ranges over the link, in squares, as a share of the range.
     correlated_share, correlation_s : float
         Share of the variance of ranges and bearings that stays while a pair measures again, and for how long. The gate
         knows the spread of one reading alone.
@@ -153,7 +158,7 @@ class CooperativeSettings:
         ``pairwise`` is refused where geometry and stated sigmas let expect a larger NEES at some time; 2 is honest, 0
         switches the check off.
     judges_stations : bool
-        Whether ground stations are judged, and those in doubt not relied on; in sessions of aircraft alone.
+        True: ground stations are judged, and those in doubt not relied on; in sessions of aircraft alone.
     """
 
     update: Update = "sequential"
