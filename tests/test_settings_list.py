@@ -9,6 +9,8 @@ from groundstation.pipeline.verbs.settings_list import every_setting, meanings, 
 from groundstation.systems import systems
 from tests.test_cli import groundstation
 
+FEWEST_WORDS = 2
+
 
 @dataclasses.dataclass(frozen=True)
 class Inner:
@@ -27,23 +29,34 @@ class Outer:
     """
 
     speed_max_mps: float = number(3.0, 0.0)
+    # A title of four words
+    far_m: float = number(1.0)  # behind the field
     # Title
     kind: Literal["a", "b"] = "a"
     # Above the field stands what it is about.
     lag_s: float | None = number(None, -1.0, 1.0)
-    inner: Inner = dataclasses.field(default_factory=Inner)
+    inner: Inner = Inner(4.0)  # Two words
 
 
 def test_a_setting_is_told_with_all_that_the_code_says() -> None:
     found = {f"{one.table}.{one.key}": one for one in settings_of("outer", Outer)}
-    assert list(found) == ["outer.speed_max_mps", "outer.kind", "outer.lag_s", "outer.inner.width_m"]
+    assert list(found) == ["outer.speed_max_mps", "outer.far_m", "outer.kind", "outer.lag_s", "outer.inner.width_m"]
     speed = found["outer.speed_max_mps"]
     assert (speed.unit, speed.default, speed.allowed) == ("m/s", "3", "0 or more")
     assert speed.meaning == "Said by the docstring, in two lines."
     assert (found["outer.kind"].allowed, found["outer.kind"].meaning) == ("a, b", "")
     assert found["outer.lag_s"].meaning == "Above the field stands what it is about."
     assert (found["outer.lag_s"].default, found["outer.lag_s"].allowed) == ("", "-1 to 1")
-    assert meanings(Inner) == {"width_m": found["outer.inner.width_m"].meaning} == {"width_m": "of a bar"}
+    assert found["outer.far_m"].meaning == "behind the field"
+    width = found["outer.inner.width_m"]
+    assert (width.default, width.meaning) == ("4", "Two words: of a bar")
+    assert meanings(Inner) == {"width_m": "of a bar"}
+
+
+def test_every_setting_has_a_meaning() -> None:
+    every = every_setting()
+    bare = [f"{one.table}.{one.key}" for one in every if len(one.meaning.split()) < FEWEST_WORDS]
+    assert len(every) > 500 and not bare, f"say what they do, behind the field: {bare}"
 
 
 def test_defaults_that_are_told_can_be_written_into_a_file() -> None:

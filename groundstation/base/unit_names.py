@@ -22,6 +22,9 @@ class UnitName(NamedTuple):
 UNITS: Mapping[str, UnitName] = MappingProxyType(
     {
         "mps_per_sqrt_s": UnitName("m/s/√s"),
+        "m_per_sqrt_s": UnitName("m/√s"),
+        "m_per_sqrt_m": UnitName("m/√m"),
+        "deg_per_sqrt_s": UnitName("°/√s", "deg/√s"),
         "deg_per_sqrt_h": UnitName("°/√h", "deg/√h"),
         "dphph_per_sqrt_h": UnitName("°/h²/√h", "deg/h²/√h"),
         "dph_per_sqrt_h": UnitName("°/h/√h", "deg/h/√h"),

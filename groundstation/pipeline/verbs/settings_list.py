@@ -58,8 +58,15 @@ def every_setting() -> tuple[Setting, ...]:
     return tuple(row for table, kind in kinds.items() for row in settings_of(table, kind))
 
 
-def settings_of(table: str, kind: type) -> Iterator[Setting]:
+def settings_of(table: str, kind: type, shipped: Any = None, subject: str = "") -> Iterator[Setting]:
     """Yield the settings of a dataclass as a table, those of dataclasses inside below it.
+
+    Parameters
+    ----------
+    shipped : optional
+        Value whose fields are the defaults, where they are not those of the class.
+    subject : str
+        What the table is about, said before each meaning.
 
     Examples
     --------
@@ -68,25 +75,28 @@ def settings_of(table: str, kind: type) -> Iterator[Setting]:
     ['memory_mb']
     """
     hints, told = typing.get_type_hints(kind), meanings(kind)
-    inside: list[tuple[str, type]] = []
+    inside: list[tuple[str, type, Any, str]] = []
     for field in dataclasses.fields(kind):
         if not field.init:
             continue
+        default = _default_value(field) if shipped is None else getattr(shipped, field.name)
+        meaning = told.get(field.name, "")
         held = _dataclass_in(hints[field.name])
         if held is not None:
-            inside.append((f"{table}.{field.name}", held))
+            value = default if isinstance(default, held) else None
+            inside.append((f"{table}.{field.name}", held, value, meaning.rstrip(".")))
             continue
         low, high = field.metadata.get("low", -math.inf), field.metadata.get("high", math.inf)
         yield Setting(
             table,
             field.name,
             _unit(field.name),
-            _default(field),
+            _default(default),
             _words(hints[field.name]) or _range(low, high),
-            told.get(field.name, ""),
+            ": ".join(filter(None, (subject, meaning))),
         )
-    for name, held in inside:
-        yield from settings_of(name, held)
+    for one in inside:
+        yield from settings_of(*one)
 
 
 def meanings(kind: type) -> Mapping[str, str]:
@@ -167,12 +177,14 @@ def _range(low: float, high: float) -> str:
     return f"at most {high:g}" if math.isinf(low) else f"{low:g} to {high:g}"
 
 
-def _default(field: "dataclasses.Field[Any]") -> str:
-    if field.default is not dataclasses.MISSING:
-        value = field.default
-    elif field.default_factory is not dataclasses.MISSING:
-        value = field.default_factory()
-    else:
+def _default_value(field: "dataclasses.Field[Any]") -> Any:
+    if field.default_factory is not dataclasses.MISSING:
+        return field.default_factory()
+    return field.default
+
+
+def _default(value: Any) -> str:
+    if value is dataclasses.MISSING:
         return "must be stated"
     if value is None:
         return ""
