@@ -58,8 +58,10 @@ def every_setting() -> tuple[Setting, ...]:
     return tuple(row for table, kind in kinds.items() for row in settings_of(table, kind))
 
 
-def settings_of(table: str, kind: type) -> Iterator[Setting]:
+def settings_of(table: str, kind: type, stated: object = None) -> Iterator[Setting]:
     """Yield the settings of a dataclass as a table, those of dataclasses inside below it.
+
+    ``stated`` holds the defaults where they are not those of the dataclass.
 
     Examples
     --------
@@ -68,25 +70,26 @@ def settings_of(table: str, kind: type) -> Iterator[Setting]:
     ['memory_mb']
     """
     hints, told = typing.get_type_hints(kind), meanings(kind)
-    inside: list[tuple[str, type]] = []
+    inside: list[tuple[str, type, object]] = []
     for field in dataclasses.fields(kind):
         if not field.init:
             continue
+        default = _default_of(field) if stated is None else getattr(stated, field.name)
         held = _dataclass_in(hints[field.name])
         if held is not None:
-            inside.append((f"{table}.{field.name}", held))
+            inside.append((f"{table}.{field.name}", held, default if isinstance(default, held) else None))
             continue
         low, high = field.metadata.get("low", -math.inf), field.metadata.get("high", math.inf)
         yield Setting(
             table,
             field.name,
             _unit(field.name),
-            _default(field),
+            _written(default),
             _words(hints[field.name]) or _range(low, high),
             told.get(field.name, ""),
         )
-    for name, held in inside:
-        yield from settings_of(name, held)
+    for name, held, default in inside:
+        yield from settings_of(name, held, default)
 
 
 def meanings(kind: type) -> Mapping[str, str]:
@@ -167,12 +170,14 @@ def _range(low: float, high: float) -> str:
     return f"at most {high:g}" if math.isinf(low) else f"{low:g} to {high:g}"
 
 
-def _default(field: "dataclasses.Field[Any]") -> str:
-    if field.default is not dataclasses.MISSING:
-        value = field.default
-    elif field.default_factory is not dataclasses.MISSING:
-        value = field.default_factory()
-    else:
+def _default_of(field: "dataclasses.Field[Any]") -> Any:
+    """Return the default of a field; ``MISSING`` where it must be stated."""
+    return field.default if field.default_factory is dataclasses.MISSING else field.default_factory()
+
+
+def _written(value: Any) -> str:
+    """Return a default as TOML writes it."""
+    if value is dataclasses.MISSING:
         return "must be stated"
     if value is None:
         return ""
