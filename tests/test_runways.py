@@ -191,6 +191,10 @@ def damaged() -> dict[str, bytes]:
     turned = replace(table, latitude_deg=table.latitude_deg[:, ::-1])
     pickled = io.BytesIO()
     np.savez(pickled, about=np.array([object()]))
+    kept = dict(np.load(SHIPPED))
+    elsewhere, numbered = io.BytesIO(), io.BytesIO()
+    np.savez(elsewhere, **(kept | {"surface": np.full_like(kept["surface"], 60_000)}))
+    np.savez(numbered, **(kept | {"about": np.frombuffer(b"5", np.uint8)}))
     swollen = io.BytesIO()
     with zipfile.ZipFile(swollen, "w") as archive:
         archive.writestr("about.npy", b"\x93NUMPY")
@@ -201,6 +205,8 @@ def damaged() -> dict[str, bytes]:
         "another archive": other.getvalue(),
         "another order": bytes_of(turned),
         "objects": pickled.getvalue(),
+        "a surface that is not there": elsewhere.getvalue(),
+        "a number for what it is about": numbered.getvalue(),
         "a cut array": swollen.getvalue(),
         "a changed byte": whole[:200_000] + bytes([whole[200_000] ^ 0xFF]) + whole[200_001:],
     }

@@ -67,6 +67,13 @@ def test_defaults_that_are_told_can_be_written_into_a_file() -> None:
         settings_from(analysis.settings, whole, "told.toml")
 
 
+def test_defaults_of_a_table_inside_are_those_that_stand() -> None:
+    found = {f"{one.table}.{one.key}": one for one in every_setting()}
+    assert found["landing.criteria.touchdown.at_most"].default == "914.4", "the first 3000 ft"
+    assert found["landing.criteria.tailwind.at_most"].default == "5.14444444444", "10 kt"
+    assert found["landing.criteria.flare.at_most"].default == ""
+
+
 def test_the_list_is_printed() -> None:
     code, out, _ = groundstation("list", "--settings")
     assert code == 0 and "[heading]" in out and "taxi_speed_min_mps" in out

@@ -27,6 +27,10 @@ FORMAT = 1
 UNIT_DEG = 1e-6
 UNKNOWN_FT = -32_768
 MOST_BYTES = 20_000_000
+UNREADABLE = (
+    *(OSError, ValueError, LookupError, TypeError, AttributeError, EOFError),
+    *(zipfile.BadZipFile, zlib.error, MemoryError),
+)
 NEXT_STEP = "make it again by groundstation runways update FILE, or remove it"
 
 
@@ -77,7 +81,7 @@ def _read(path: Path, _modified_ns: int, _size: int) -> RunwayTable:
             raise GroundstationError(str(path), "too large", f"at most {MOST_BYTES} bytes", NEXT_STEP)
         with np.load(path, allow_pickle=False) as kept:
             return _of_arrays({name: kept[name] for name in kept.files})
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error, MemoryError) as error:
+    except UNREADABLE as error:
         raise GroundstationError(
             str(path), f"not a table of runways ({type(error).__name__})", "one that runways update made", NEXT_STEP
         ) from error
@@ -124,7 +128,7 @@ def _of_arrays(kept: dict[str, NDArray[Any]]) -> RunwayTable:
 
     Raises
     ------
-    ValueError, KeyError, TypeError
+    ValueError, LookupError, TypeError, AttributeError
         When they are not those of a table.
     """
     about = json.loads(kept["about"].tobytes())

@@ -18,7 +18,7 @@ class Worst(NamedTuple):
 def worst_sustained(time_s: FloatArray, values: FloatArray, for_s: float) -> Worst | None:
     """Return the greatest level that the values kept for ``for_s`` or more.
 
-    A stretch that is shorter as a whole counts by what it keeps all along. Missing samples end a stretch.
+    Where no stretch is so long, a shorter one counts by what it keeps all along. Missing samples end a stretch.
 
     Examples
     --------
@@ -26,18 +26,17 @@ def worst_sustained(time_s: FloatArray, values: FloatArray, for_s: float) -> Wor
     >>> worst_sustained(at, np.array([0.0, 9.0, 0.0, 3.0, 4.0, 5.0, 3.0, 0.0]), 3.0)
     Worst(value=3.0, row=3)
     """
-    best: Worst | None = None
+    lasted, shorter = list[Worst](), list[Worst]()
     for first, last in runs(np.isfinite(values)):
         for start in range(first, last):
             stop = int(np.searchsorted(time_s[:last], time_s[start] + for_s - 1e-9, side="left"))
-            if stop >= last:
-                if start > first or best is not None:
-                    break
-                stop = last - 1
-            level = float(np.min(values[start : stop + 1]))
-            if best is None or level > best.value:
-                best = Worst(level, start)
-    return best
+            if stop < last:
+                lasted.append(Worst(float(np.min(values[start : stop + 1])), start))
+                continue
+            if start == first:
+                shorter.append(Worst(float(np.min(values[first:last])), first))
+            break
+    return max(lasted or shorter, key=lambda one: one.value, default=None)
 
 
 def lasting(time_s: FloatArray, is_over: np.ndarray, for_s: float) -> tuple[tuple[int, int], ...]:

@@ -169,7 +169,7 @@ def by_wheel_speed(flight: "Flight", ground_speed_mps: float, grid_s: FloatArray
             rate = rate_of(time_s)
             is_up = speed > SPUN_UP * ground_speed_mps
             up = np.flatnonzero(is_up[1:] & ~is_up[:-1])
-            if not up.size or is_up[: up[0]].mean() > 0.2:
+            if not up.size or is_up[: up[0] + 1].mean() > 0.2:
                 return Hint(name, topic, rate, None, "no wheel spins up")
             low, high = float(time_s[up[0]]), float(time_s[up[0] + 1])
             return Hint(name, topic, rate, _between(grid_s, low - RISE_S, high, RISE_S, 0.0))

@@ -242,3 +242,5 @@ def test_a_level_that_lasts_is_the_greatest_kept() -> None:
     time_s = np.arange(6.0)
     assert worst_sustained(time_s, np.array([1.0, np.nan, 8.0, 7.0, 6.0, 1.0]), 2.0) == (6.0, 2)
     assert worst_sustained(time_s, np.full(6, np.nan), 2.0) is None
+    assert worst_sustained(time_s, np.array([9.0, np.nan, 8.0, 7.0, 6.0, 1.0]), 2.0) == (6.0, 2), "a lone sample"
+    assert worst_sustained(time_s, np.array([3.0, 4.0, np.nan, np.nan, 9.0, 8.0]), 2.0) == (8.0, 4), "none lasts"

@@ -26,6 +26,7 @@ from groundstation.systems.landing.settings import LandingSettings
 from groundstation.systems.landing.sink import sink_rate_of
 from groundstation.systems.landing.touchdown_answer import Touchdown, Witness
 from groundstation.systems.landing.touchdown_study import FAMILIES, drawn, study_touchdown
+from groundstation.systems.landing.witnesses import by_wheel_speed
 from groundstation.tables.phases import PhaseInterval, Phases, flight_phases
 from tests.real_logs import real_log
 from tests.report_example import example
@@ -103,6 +104,17 @@ def test_each_witness_alone_holds_the_contact(channels: TouchdownChannels, name:
 def test_a_slow_load_is_no_witness_and_says_why() -> None:
     found = evidence(made(channels=TouchdownChannels(load_hz=1.0)))
     assert "falls between the samples" in witness(found, "normal acceleration").reason
+
+
+def test_a_wheel_speed_that_begins_one_sample_before_the_spin_up_is_a_witness() -> None:
+    simulated = made(channels=replace(NOTHING, wheel_speed_hz=2.0))
+    flight, table = simulated.flight, simulated.flight["discrete"]
+    at_s = flight.time_s("discrete")
+    late = table.take(at_s >= at_s[np.searchsorted(at_s, simulated.contact_s) - 1])
+    grid_s = simulated.contact_s + np.arange(-12.0, 12.0, 0.02)
+    found = by_wheel_speed(replace(flight, tables={**flight.tables, "discrete": late}), 60.0, grid_s)
+    assert found.likelihood is not None
+    assert abs(float(grid_s[np.argmax(found.likelihood)]) - simulated.contact_s) < 0.6
 
 
 @pytest.mark.parametrize("slope", [-0.015, 0.015])
