@@ -25,6 +25,7 @@ from groundstation.methods.fleet.density import densities_of, histogram_of
 from groundstation.methods.fleet.deviation import deviations
 from groundstation.methods.fleet.moments import moments_of
 from groundstation.methods.fleet.skill import SkillMerger
+from groundstation.methods.fleet.trends import trends
 from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS
 from groundstation.pipeline.many_flights.fleet.statistics import gather
 from groundstation.reports.fleet_report import MOST_ROWS_ON_PAPER, PAGE, write_fleet_report
@@ -32,6 +33,7 @@ from groundstation.results.arrays.fleet import FleetChecks, FleetSkillFlights
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet import FleetResults, NotInFleet
 from groundstation.results.fleet_share import SkillOfFlight
+from groundstation.results.fleet_units import UnitLimits
 from groundstation.systems import systems
 from groundstation.systems.heading import fleet_densities_plots as densities
 from tests.browser import Browser
@@ -51,6 +53,7 @@ def fleet_of(
     samples: int = 200,
     step_deg: float = 0.8,
     not_in_fleet: Sequence[NotInFleet] = (),
+    limits: UnitLimits | None = None,
     **changes: Any,
 ) -> FleetResults:
     """A fleet as the pipeline would gather it: flights in turn by aircraft, the first of which changes half-way.
@@ -95,7 +98,7 @@ def fleet_of(
     } | changes
     flights = flights_table({one.name: given.get(one.name, [EMPTY[one.kind]] * count) for one in FLIGHT_COLUMNS})
     settings = ChangeSettings()
-    trend, changed = answer.trends(flights, settings)
+    trend = trends(flights, settings, limits)
     skill, skill_flights = skill_of(flights, rate)
     checks = checks_of(flights, rng)
     return FleetResults(
@@ -103,8 +106,8 @@ def fleet_of(
         densities_of(ids, owner, moments, [histogram_of(own) for own in values]),
         answer.normals_of(owner, moments),
         answer.by_aircraft(flights),
-        trend,
-        changed,
+        trend.charts,
+        trend.changes,
         skill.rows(),
         skill_flights,
         answer.calibrations(checks),
@@ -113,6 +116,7 @@ def fleet_of(
         tuple(not_in_fleet),
         answer.stated_rates(settings),
         deviations(flights),
+        slopes=trend.slopes,
     )
 
 
@@ -213,6 +217,19 @@ def test_the_page_holds_what_the_results_say(usual: FleetResults, html: str) -> 
     assert f"{reference.inside} of {reference.checks}" in text and "▲ too sure" in text
     at_60 = next(row for row in usual.skill if (row.method, row.horizon_min) == ("last_estimate", 60.0))
     assert f"{at_60.rms_m:.0f}\u202fm" in html
+
+
+def test_a_slope_is_told_on_top_with_its_date(tmp_path: Path) -> None:
+    drift = 0.08 * np.arange(20) + np.random.default_rng(5).normal(0.0, 0.05, 20)
+    fleet = fleet_of(20, ("A12",), samples=20, limits=UnitLimits(heading_error_deg=3.0), error_deg=drift.tolist())
+    (slope,) = (one for one in fleet.slopes if one.quantity == "error_deg")
+    text = page_of(tmp_path, fleet).text
+    due = np.datetime64(slope.due_utc_ns, "ns").astype("datetime64[D]")
+    assert slope.is_slope and "1 slope" in text and f"reaches 3.000° on {due} (95 %" in text
+    assert (
+        f"A12: heading error rises by {slope.slope_per_flight:+.3f}° a flight" in text
+        and "over 20 flights since 2026-05-04" in text
+    )
 
 
 def test_only_the_script_of_the_report_may_run(html: str) -> None:

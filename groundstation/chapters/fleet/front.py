@@ -5,6 +5,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from groundstation.chapters.fleet import slopes
 from groundstation.chapters.fleet.chapter import FleetChapter
 from groundstation.chapters.fleet.common import aircraft_name, day, figure_of, plural, title_of, verdict_words
 from groundstation.chapters.gates import VERDICTS
@@ -79,6 +80,7 @@ def _attention(fleet: FleetResults) -> tuple[Mark, str]:
     failed = sum(one.kind == "failed" for one in fleet.not_in_fleet) + int(np.sum(flights["status"] == "failed"))
     counted = (
         (len(fleet.change_points), "change of level", "changes of level"),
+        (len(slopes.sloping(fleet)), "slope", "slopes"),
         (off, "flight with an INS off", "flights with an INS off"),
         *((rejected, "rejected", "rejected"), (outliers, "outlier", "outliers"), (failed, "log failed", "logs failed")),
     )
@@ -89,7 +91,7 @@ def _attention(fleet: FleetResults) -> tuple[Mark, str]:
         return Mark("unknown", "Nothing here"), "No log gave a flight"
     if not np.isfinite(flights["error_deg"]).any():
         return Mark("unknown", "Not assessable"), "No flight has a heading error"
-    return Mark("good", "Quiet"), "No outlier, no change of level, nothing rejected or failed"
+    return Mark("good", "Quiet"), "No outlier, no change of level, no slope, nothing rejected or failed"
 
 
 def _changes(fleet: FleetResults) -> list[str]:
@@ -98,7 +100,9 @@ def _changes(fleet: FleetResults) -> list[str]:
         f"{day(np.datetime64(one.start_utc_ns, 'ns'))}, {figure_of(one.quantity, one.level_after)} since."
         for one in fleet.change_points[:MOST_CHANGES]
     ]
-    more = len(fleet.change_points) - len(told)
+    more, sloping = len(fleet.change_points) - len(told), slopes.sloping(fleet)
+    told += [slopes.sentence_of(one) for one in sloping[:MOST_CHANGES]]
+    more += len(sloping[MOST_CHANGES:])
     return [*told, f"{plural(more, 'change')} more in the chapter on the trend."] if more else told
 
 
