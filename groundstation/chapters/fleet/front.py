@@ -39,7 +39,7 @@ def build(fleet: FleetResults, chapters: Iterable[FleetChapter]) -> Front:
         pairs,
         verdict=verdict,
         headline=headline,
-        sentences=(*_changes(fleet), _judged(fleet)) if len(fleet) else (),
+        sentences=(*_flights(fleet), *_changes(fleet), _judged(fleet)) if len(fleet) else (),
         figures=tuple(figure for chapter in chapters for figure in chapter.figures(fleet)),
     )
 
@@ -76,13 +76,19 @@ def _attention(fleet: FleetResults) -> tuple[Mark, str]:
     flights = fleet.flights
     outliers = len({one.flight_id for one in fleet.outliers})
     rejected = int(np.sum(flights["verdict"] == "reject"))
+    unstable = int(np.nansum(flights["landing_unstable_approaches"]))
+    lost, unhealthy = int(np.sum(flights["has_lost_data"])), int(np.sum(flights["health_verdict"] == "fail"))
     off = int(np.sum(flights["units_verdict"] == "off"))
     failed = sum(one.kind == "failed" for one in fleet.not_in_fleet) + int(np.sum(flights["status"] == "failed"))
     counted = (
         (len(fleet.change_points), "change of level", "changes of level"),
         (len(slopes.sloping(fleet)), "slope", "slopes"),
         (off, "flight with an INS off", "flights with an INS off"),
-        *((rejected, "rejected", "rejected"), (outliers, "outlier", "outliers"), (failed, "log failed", "logs failed")),
+        (rejected, "rejected", "rejected"),
+        (unstable, "approach not stabilised", "approaches not stabilised"),
+        (unhealthy, "flight with failed health", "flights with failed health"),
+        (lost, "flight with lost data", "flights with lost data"),
+        *((outliers, "outlier", "outliers"), (failed, "log failed", "logs failed")),
     )
     told = [plural(*one) for one in counted if one[0]]
     if told:
@@ -92,6 +98,24 @@ def _attention(fleet: FleetResults) -> tuple[Mark, str]:
     if not np.isfinite(flights["error_deg"]).any():
         return Mark("unknown", "Not assessable"), "No flight has a heading error"
     return Mark("good", "Quiet"), "No outlier, no change of level, no slope, nothing rejected or failed"
+
+
+def _flights(fleet: FleetResults) -> list[str]:
+    """Return the names of the flights that were rejected, flew unstable approaches or lost data."""
+    flights = fleet.flights
+    kinds = (
+        ("Rejected", flights["verdict"] == "reject"),
+        ("Approach not stabilised", flights["landing_unstable_approaches"] > 0),
+        ("Health failed", flights["health_verdict"] == "fail"),
+        ("Data lost", flights["has_lost_data"].astype(np.bool_)),
+    )
+    return [f"{title}: {_some(flights['flight_id'][chosen].tolist())}." for title, chosen in kinds if chosen.any()]
+
+
+def _some(names: list[str]) -> str:
+    shown = [aircraft_name(name) for name in names[:MOST_CHANGES]]
+    more = len(names) - len(shown)
+    return ", ".join(shown) + (f" and {number(more, 0)} more" if more else "")
 
 
 def _changes(fleet: FleetResults) -> list[str]:
