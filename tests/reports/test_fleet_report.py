@@ -256,10 +256,10 @@ def test_what_asks_for_a_look_is_on_the_first_screen(tmp_path: Path) -> None:
     assert f"Data lost: {ids[1]}." in first and f"Health failed: {ids[2]}." in first
     assert "1 rejected · 1 approach not stabilised · 1 flight with failed health · 1 flight with lost data" in first
     heads = [one.title for one in flights.heads_of(fleet)]
-    assert heads[-6:] == ["Duration", "Approaches", "Health", "Trajectory", "Log", "Remarks"]
+    assert heads[-5:] == ["Duration", "Approaches", "Health", "Trajectory", "Remarks"]
     rows = cells((tmp_path / PAGE).read_text(encoding="utf-8"))
-    assert rows[0][10:15] == ["1:02:05", "▲ 2 (1)", "—", "✓ accepted", "a.ulg"]
-    assert "1 approach not stabilised (last: speed, sink rate)" in rows[0][15] and "vibration high" in rows[2][15]
+    assert rows[0][10:14] == ["1:02:05", "▲ 2 (1)", "—", "✓ accepted"] and "a.ulg" in rows[0][15]
+    assert "1 approach not stabilised (last: speed, sink rate)" in rows[0][14] and "vibration high" in rows[2][14]
     bare = fleet_of(3, ("A12",), samples=20, error_deg=[math.nan] * 3)
     assert "Error, °" not in [one.title for one in flights.heads_of(bare)]
 
@@ -392,6 +392,19 @@ def test_the_table_sorts_by_number_and_missing_stays_last(tmp_path: Path, chromi
         chromium.run("document.querySelectorAll('#flights-table button')[4].click()")
         shown = chromium.run("document.documentElement.outerHTML")
         assert [row[4] for row in cells(shown)] == expected.split()
+
+
+def test_every_table_sorts(tmp_path: Path, chromium: Browser) -> None:
+    page_of(tmp_path, fleet_of(60, not_in_fleet=MISSING))
+    chromium.open(tmp_path / PAGE)
+    table = "Array.from(document.querySelectorAll('#aircraft table'))[0]"
+    for sign in (1, -1):
+        chromium.run(f"{table}.querySelectorAll('button')[4].click()")
+        shown = chromium.run(f"Array.from({table}.tBodies[0].rows).map(row => row.cells[4].textContent)")
+        values = [sign * float(text.replace("−", "-")) for text in shown]
+        assert len(values) == 3 and values == sorted(values)
+    assert chromium.run(f"{table}.querySelectorAll('th')[4].getAttribute('aria-sort')") == "descending"
+    assert not chromium.complaints()
 
 
 def test_without_typst_the_page_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

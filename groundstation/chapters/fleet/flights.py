@@ -29,13 +29,14 @@ LINKED = (("recording", "rrd"), ("mcap", "mcap"))
 class FlightLine:
     """Flight in the table: its cells but the last, remarks and links.
 
-    A link is a text and an address relative to the fleet's page.
+    A link is a text and an address relative to the fleet's page; ``log`` is the name of the log, shortened.
     """
 
     report: str
     cells: Sequence[Cell]
     remarks: Sequence[Mark]
     links: Sequence[tuple[str, str]]
+    log: str
 
 
 def lines(fleet: FleetResults) -> list[FlightLine]:
@@ -91,7 +92,8 @@ def _shown(fleet: FleetResults, noted: Mapping[str, Sequence[Mark]]) -> NDArray[
 def _line(row: dict[str, Any], columns: Sequence["Column"], remarks: Sequence[Mark]) -> FlightLine:
     links = [(text, row[name]) for name, text in LINKED if row[name]]
     cells = [column.cell(row) for column in columns]
-    return FlightLine(row["report"], cells, remarks, [*links, ("folder", row["flight_id"] + "/")])
+    log = shortened_name(row["source"])
+    return FlightLine(row["report"], cells, remarks, [*links, ("folder", row["flight_id"] + "/")], log)
 
 
 def verdict_mark(verdict: str) -> Mark:
@@ -152,7 +154,6 @@ COLUMNS = (
     Column(Head("Approaches"), _approaches, "landing_approaches"),
     Column(Head("Health"), _graded("health_verdict", GRADES), "health_verdict"),
     Column(Head("Trajectory"), _graded("trajectory_state", STATES), "trajectory_state"),
-    Column(Head("Log"), lambda row: shortened_name(row["source"]), "source"),
 )
 REMARKS = Head("Remarks")
 ON_PAPER = ("Flight", "Start, UTC", "Verdict", "Error, °", "± 95 %, °", "Approaches", "Health")
@@ -175,7 +176,7 @@ def heads_of(fleet: FleetResults) -> list[Head]:
 
 def shortened_name(name: str, most: int = 48) -> str:
     """Return the name of a log, its middle left out where very long."""
-    name = clean(name) or ABSENT
+    name = clean(name)
     return name if len(name) <= most else f"{name[: most // 2]}…{name[-(most // 2 - 1) :]}"
 
 

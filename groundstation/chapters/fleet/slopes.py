@@ -38,8 +38,8 @@ def grid(fleet: FleetResults) -> Grid | None:
     if not fleet.slopes:
         return None
     heads = (
-        *(Head("Aircraft"), Head("Quantity"), Head("Flights", True), Head("From"), Head("Slope a flight", True)),
-        *(Head("95 %", True), Head("a year", True), Head("Level now", True), Head("95 %", True), Head("Outlook")),
+        *(Head("Aircraft"), Head("Quantity"), Head("Flights", True), Head("Slope a flight", True)),
+        *(Head("Level now", True), Head("State"), Head("Limit", True), Head("Reached on")),
     )
     order = sorted(fleet.slopes, key=lambda one: not one.is_slope)
     return Grid("Slopes", heads, [_row(one) for one in order], CAPTION)
@@ -47,16 +47,24 @@ def grid(fleet: FleetResults) -> Grid | None:
 
 def _row(one: SlopeRow) -> tuple[Cell, ...]:
     slope, low, high = (figure_of(one.quantity, value) for value in one.per_flight)
-    levels = (figure_of(one.quantity, value) for value in (one.level_low, one.level_high))
-    outlook: Cell = "no slope is shown"
-    if one.is_slope or one.is_over:
-        text = _due(one) or _verb(one)
-        outlook = Mark("bad" if one.is_over else "warn", text)
+    level, least, most = (figure_of(one.quantity, value) for value in (one.level, one.level_low, one.level_high))
+    state: Cell = Mark("bad", "beyond") if one.is_over else Mark("warn", _verb(one)) if one.is_slope else "no slope"
+    due = ABSENT
+    if one.due_utc_ns is not None:
+        due = f"{_date(one.due_utc_ns)} ({_date(one.due_earliest_utc_ns)} … {_end(one)})"
     return (
-        *(aircraft_name(one.aircraft), title_of(one.quantity), number(one.flights, 0), _date(one.since_utc_ns)),
-        *(slope, f"{low} … {high}", figure_of(one.quantity, one.slope_per_year)),
-        *(figure_of(one.quantity, one.level), " … ".join(levels), outlook),
+        *(aircraft_name(one.aircraft), title_of(one.quantity), number(one.flights, 0)),
+        *(f"{slope} ({low} … {high})", f"{level} ({least} … {most})", state),
+        *(ABSENT if one.limit is None else _limit(one), due),
     )
+
+
+def _limit(one: SlopeRow) -> str:
+    return figure_of(one.quantity, one.limit).lstrip("+")
+
+
+def _end(one: SlopeRow) -> str:
+    return "no sure end" if one.due_latest_utc_ns is None else _date(one.due_latest_utc_ns)
 
 
 def _verb(one: SlopeRow) -> str:
@@ -67,13 +75,12 @@ def _due(one: SlopeRow) -> str:
     """Return when the limit is reached; empty without a limit."""
     if one.limit is None:
         return ""
-    limit = figure_of(one.quantity, one.limit).lstrip("+")
+    limit = _limit(one)
     if one.is_over:
         return f"beyond its limit of {limit}"
     if one.due_utc_ns is None:
         return f"does not reach {limit} in ten years"
-    end = "no sure end" if one.due_latest_utc_ns is None else _date(one.due_latest_utc_ns)
-    return f"reaches {limit} on {_date(one.due_utc_ns)} (95 % {_date(one.due_earliest_utc_ns)} … {end})"
+    return f"reaches {limit} on {_date(one.due_utc_ns)} (95 % {_date(one.due_earliest_utc_ns)} … {_end(one)})"
 
 
 def _date(time_ns: int | None) -> str:
