@@ -14,11 +14,13 @@ from groundstation.methods.fleet.deviation import deviations
 from groundstation.methods.fleet.moments import Moments, merged, moments_of
 from groundstation.methods.fleet.outliers import find_outliers
 from groundstation.methods.fleet.skill import SkillMerger
+from groundstation.methods.fleet.trends import trends
 from groundstation.methods.intervals import share_interval
 from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS
 from groundstation.results.columns import READ_BY_FLEETS
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet_share import SkillOfFlight
+from groundstation.results.fleet_units import UnitLimits
 from tests.fleet_example import flights_table
 
 LUCK_SIGMAS = 4.0  # of a share counted over simulated series: a right rate is outside once in sixteen thousand tests
@@ -173,7 +175,7 @@ def test_an_aircraft_that_shakes_more_than_it_did_is_an_outlier_and_a_change() -
     assert [(one.flight_id, one.quantity) for one in found] == [("F0011", "health_vibration_mps2")]
     assert "vibration in the air, m/s2: 9, usual for this aircraft 1.98" in found[0].reason
     risen = np.where(np.arange(40) >= 20, 2.0, 1.0) * np.exp(rng.normal(np.log(2.0), 0.1, 40))
-    _, changes = answer.trends(table(health_vibration_mps2=risen, start_utc=start), ChangeSettings())
+    changes = trends(table(health_vibration_mps2=risen, start_utc=start), ChangeSettings()).changes
     assert ("health_vibration_mps2", "F0020") in [(one.quantity, one.flight_id) for one in changes]
 
 
@@ -184,7 +186,8 @@ def test_trend_is_in_order_of_time_and_names_the_first_flight_of_a_level() -> No
     start = [int(1_700_000_000_000_000_000 + day * DAY_NS) for day in order]
     names = ["A12"] * 47 + [""] * 3
     flights = table(error_deg=error, start_utc=[None, *start[1:]], aircraft=names)
-    trend, changes = answer.trends(flights, ChangeSettings())
+    found = trends(flights, ChangeSettings())
+    trend, changes = found.charts, found.changes
     kept = list(range(1, 47))
     assert len(trend) == len(kept) and set(trend["quantity"].tolist()) == {"error_deg"}
     assert (np.diff(trend["start_utc"]) > np.timedelta64(0)).all()
@@ -193,6 +196,55 @@ def test_trend_is_in_order_of_time_and_names_the_first_flight_of_a_level() -> No
     assert change.flight_id == f"F{first:04d}" and change.start_utc_ns == start[first]
     assert change.level_after - change.level_before == pytest.approx(1.0, abs=0.15)
     assert change.flights_before + change.flights_after == len(kept) and change.p_value <= 0.01
+
+
+def days(count: int) -> list[int]:
+    """Starts of daily flights."""
+    return [1_700_000_000_000_000_000 + day * DAY_NS for day in range(count)]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_slow_drift_is_a_slope_with_the_date_of_the_limit(sign: float) -> None:
+    drift = sign * (0.08 * np.arange(20) + np.random.default_rng(21).normal(0.0, 0.1, 20))
+    found = trends(table(error_deg=drift, start_utc=days(20)), ChangeSettings(), UnitLimits(heading_error_deg=2.0))
+    (slope,) = found.slopes
+    assert not found.changes and slope.is_slope and slope.flights == 20 and not slope.is_over
+    assert slope.slope_per_flight == pytest.approx(sign * 0.08, abs=0.008)
+    low, high = sorted(slope.per_flight[1:])
+    assert low < sign * 0.08 < high and high - low < 0.03
+    due = 1_700_000_000_000_000_000 + 25 * DAY_NS  # 2 deg at 0.08 deg a day
+    assert slope.due_earliest_utc_ns and slope.due_utc_ns and slope.due_latest_utc_ns
+    assert slope.due_earliest_utc_ns <= due + DAY_NS and slope.due_latest_utc_ns >= due - DAY_NS
+    assert abs(slope.due_utc_ns - due) <= 2 * DAY_NS
+    assert not found.charts.is_outside.any() and np.ptp(found.charts.level) == pytest.approx(1.52, abs=0.2)
+    (bare,) = trends(table(error_deg=drift, start_utc=days(20)), ChangeSettings()).slopes
+    assert bare.is_slope and bare.limit is None and bare.due_utc_ns is None
+    own = UnitLimits(heading_error_deg=1.0)
+    (over,) = trends(table(error_deg=drift, start_utc=days(20)), ChangeSettings(), own).slopes
+    assert over.is_over and over.due_utc_ns is None
+
+
+def test_a_step_is_no_slope_and_steady_flights_have_none() -> None:
+    rng = np.random.default_rng(22)
+    called = {"step": 0, "slope": 0, "steady": 0}
+    for _ in range(12):
+        noise, at = rng.normal(0.0, 0.1, 20), np.arange(20)
+        shapes = {"step": np.where(at >= 8, 1.0, 0.0), "slope": 0.08 * at, "steady": np.zeros(20)}
+        for name, shape in shapes.items():
+            found = trends(table(error_deg=noise + shape, start_utc=days(20)), ChangeSettings())
+            is_sloped = any(one.is_slope for one in found.slopes)
+            called[name] += is_sloped if name != "step" else is_sloped or len(found.changes) != 1
+    assert called["step"] <= 2 and called["slope"] >= 10 and called["steady"] <= 1
+
+
+def test_flights_at_one_time_and_ratios_that_rise() -> None:
+    same = trends(table(error_deg=0.08 * np.arange(20), start_utc=days(1) * 20), ChangeSettings())
+    assert same.slopes == () and len(same.charts) == 20
+    ratio = 0.3 + 0.02 * np.arange(30) + np.random.default_rng(23).normal(0.0, 0.01, 30)
+    (slope,) = trends(table(health_test_ratio=ratio, start_utc=days(30)), ChangeSettings()).slopes
+    assert slope.is_slope and slope.limit == 1.0 and slope.due_utc_ns is not None
+    (falling,) = trends(table(health_test_ratio=ratio[::-1], start_utc=days(30)), ChangeSettings()).slopes
+    assert falling.is_slope and falling.slope_per_year < 0.0 and falling.due_utc_ns is None
 
 
 def test_by_aircraft_counts_flights_and_merges_samples() -> None:

@@ -83,7 +83,7 @@ def fleet_report_html(document: Document, fleet: FleetResults) -> str:
         front=document.front,
         sections=document.sections,
         table_key=flights.KEY,
-        heads=flights.HEADS,
+        heads=flights.heads_of(fleet),
         lines=flights.lines(fleet),
         table_caption=flights.caption_of(fleet),
         script=script,

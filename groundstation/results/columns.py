@@ -16,8 +16,9 @@ READ_BY_FLEETS: Mapping[str, Kind] = {
     **dict.fromkeys(("verdict", "ins_kind", "magnetic_verdict", "magnetic_method"), "category"),
     **dict.fromkeys(("flux_verdict", "flux_method", "units_verdict"), "category"),
     "units_off": "text",
-    "verdict_reason": "text",
-    "samples": "count",
+    **dict.fromkeys(("health_verdict", "trajectory_state"), "category"),
+    **dict.fromkeys(("verdict_reason", "landing_criteria_not_met", "health_sentence"), "text"),
+    **dict.fromkeys(("samples", "landing_approaches", "landing_unstable_approaches"), "count"),
     **dict.fromkeys(
         (
             *("error_deg", "standard_error_deg", "confidence95_low_deg", "confidence95_high_deg", "correction_deg"),

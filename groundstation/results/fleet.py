@@ -14,6 +14,7 @@ from groundstation.base.serial import to_json
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.results.arrays.fleet import FleetChecks, FleetInstallationFlights, FleetSkillFlights, FleetTrend
 from groundstation.results.figures import FigureData
+from groundstation.results.fleet_trends import ChangePoint, SlopeRow
 from groundstation.results.fleet_units import FleetUnitFlights, FleetUnitRow, UnitEventRow, UnitTrendRow
 from groundstation.results.frames import row_fields, rows_frame
 from groundstation.results.installations import InstallationRow
@@ -22,15 +23,6 @@ from groundstation.results.roles import LETTERS
 if TYPE_CHECKING:
     import pandas as pd
 
-TrendQuantity = Literal[
-    "error_deg",
-    "radial_error_rate_fit_nmiph",
-    "health_vibration_mps2",
-    "health_hdop",
-    "health_test_ratio",
-    "onboard_heading_rms_deg",
-    "onboard_tilt_rms_deg",
-]
 WHOLE_FLEET = ""  # where an aircraft is named and all of them are meant
 
 
@@ -126,25 +118,6 @@ class AircraftRow:
     sigma_within_deg: float | None
     sigma_between_deg: float | None
     heterogeneity: float | None
-
-
-@dataclass(frozen=True)
-class ChangePoint:
-    """Flight from which on a quantity of an aircraft has another level.
-
-    ``flight_id`` is the first flight of the new level; ``level_before`` and ``level_after`` are medians, in the unit of
-    ``quantity``; ``p_value`` the chance of so large a step anywhere in a steady series.
-    """
-
-    aircraft: str
-    quantity: TrendQuantity
-    flight_id: str
-    start_utc_ns: int
-    flights_before: int
-    flights_after: int
-    level_before: float
-    level_after: float
-    p_value: float
 
 
 @dataclass(frozen=True)
@@ -312,6 +285,8 @@ class FleetResults:
     trend : FleetTrend
         Control charts.
     change_points : tuple of ChangePoint
+    slopes : tuple of SlopeRow
+        The line behind each control chart since its last change.
     skill : tuple of FleetSkill
         By method in the order of ``METHODS``, then horizon.
     skill_flights : FleetSkillFlights
@@ -357,6 +332,7 @@ class FleetResults:
     stated: Mapping[str, float] = field(default_factory=dict)
     deviations: tuple[FleetDeviationRow, ...] = ()
     sessions: tuple[SessionRow, ...] = ()
+    slopes: tuple[SlopeRow, ...] = ()
     installations: tuple[InstallationRow, ...] = ()
     installation_flights: FleetInstallationFlights = field(default_factory=FleetInstallationFlights.empty)
     units: tuple[FleetUnitRow, ...] = ()

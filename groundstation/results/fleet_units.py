@@ -88,6 +88,8 @@ class UnitLimits:
     ----------
     rate_nmiph : float, optional
         Of all units; None: that of the class.
+    heading_error_deg : float, optional
+        Of the heading error of an aircraft, to either side, for the date at which its slope reaches it.
     months_ahead : float
         A unit without a trend is called steady when its interval stays below the limit for so long.
     gap_days : float
@@ -97,6 +99,7 @@ class UnitLimits:
     """
 
     rate_nmiph: float | None = number(None, 1e-6, 1e6)
+    heading_error_deg: float | None = number(None, 1e-6, 180.0)
     months_ahead: float = number(12.0, 0.1, 120.0)
     gap_days: float = number(90.0, 1.0, 36_500.0)
     serials: tuple[UnitLimit, ...] = field(default=())

@@ -25,6 +25,7 @@ from groundstation.methods.fleet.density import densities_of, histogram_of
 from groundstation.methods.fleet.deviation import deviations
 from groundstation.methods.fleet.moments import moments_of
 from groundstation.methods.fleet.skill import SkillMerger
+from groundstation.methods.fleet.trends import trends
 from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS
 from groundstation.pipeline.many_flights.fleet.statistics import gather
 from groundstation.reports.fleet_report import MOST_ROWS_ON_PAPER, PAGE, write_fleet_report
@@ -32,6 +33,7 @@ from groundstation.results.arrays.fleet import FleetChecks, FleetSkillFlights
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet import FleetResults, NotInFleet
 from groundstation.results.fleet_share import SkillOfFlight
+from groundstation.results.fleet_units import UnitLimits
 from groundstation.systems import systems
 from groundstation.systems.heading import fleet_densities_plots as densities
 from tests.browser import Browser
@@ -51,6 +53,7 @@ def fleet_of(
     samples: int = 200,
     step_deg: float = 0.8,
     not_in_fleet: Sequence[NotInFleet] = (),
+    limits: UnitLimits | None = None,
     **changes: Any,
 ) -> FleetResults:
     """A fleet as the pipeline would gather it: flights in turn by aircraft, the first of which changes half-way.
@@ -95,7 +98,7 @@ def fleet_of(
     } | changes
     flights = flights_table({one.name: given.get(one.name, [EMPTY[one.kind]] * count) for one in FLIGHT_COLUMNS})
     settings = ChangeSettings()
-    trend, changed = answer.trends(flights, settings)
+    trend = trends(flights, settings, limits)
     skill, skill_flights = skill_of(flights, rate)
     checks = checks_of(flights, rng)
     return FleetResults(
@@ -103,8 +106,8 @@ def fleet_of(
         densities_of(ids, owner, moments, [histogram_of(own) for own in values]),
         answer.normals_of(owner, moments),
         answer.by_aircraft(flights),
-        trend,
-        changed,
+        trend.charts,
+        trend.changes,
         skill.rows(),
         skill_flights,
         answer.calibrations(checks),
@@ -113,6 +116,7 @@ def fleet_of(
         tuple(not_in_fleet),
         answer.stated_rates(settings),
         deviations(flights),
+        slopes=trend.slopes,
     )
 
 
@@ -201,10 +205,10 @@ def test_every_flight_has_a_row_with_its_figures(usual: FleetResults, html: str)
 
 
 def test_the_page_holds_what_the_results_say(usual: FleetResults, html: str) -> None:
-    text, normal = Page(html).text, usual.normal()
-    assert normal is not None and len(usual.change_points) == 1
+    text = Page(html).text
+    assert len(usual.change_points) == 1
     (change,) = usual.change_points
-    assert f"mean {normal.mean_deg:+.3f}° and σ {normal.sigma_deg:.3f}°" in text
+    assert "fitted to them" not in text and "Whole fleet" not in text  # no mean over different aircraft
     assert f"A12: heading error {change.level_before:+.3f}° before" in text and change.flight_id in text
     assert "60 flights of 3 aircraft" in text and "day 2/b.csv no time column" in text
     low, high = usual.by_aircraft[1].confidence95_deg or (0.0, 0.0)
@@ -213,6 +217,51 @@ def test_the_page_holds_what_the_results_say(usual: FleetResults, html: str) -> 
     assert f"{reference.inside} of {reference.checks}" in text and "▲ too sure" in text
     at_60 = next(row for row in usual.skill if (row.method, row.horizon_min) == ("last_estimate", 60.0))
     assert f"{at_60.rms_m:.0f}\u202fm" in html
+
+
+def test_a_slope_is_told_on_top_with_its_date(tmp_path: Path) -> None:
+    drift = 0.08 * np.arange(20) + np.random.default_rng(5).normal(0.0, 0.05, 20)
+    fleet = fleet_of(20, ("A12",), samples=20, limits=UnitLimits(heading_error_deg=3.0), error_deg=drift.tolist())
+    (slope,) = (one for one in fleet.slopes if one.quantity == "error_deg")
+    text = page_of(tmp_path, fleet).text
+    due = np.datetime64(slope.due_utc_ns, "ns").astype("datetime64[D]")
+    assert slope.is_slope and "1 slope" in text and f"reaches 3.000° on {due} (95 %" in text
+    assert (
+        f"A12: heading error rises by {slope.slope_per_flight:+.3f}° a flight" in text
+        and "over 20 flights since 2026-05-04" in text
+    )
+
+
+def test_what_asks_for_a_look_is_on_the_first_screen(tmp_path: Path) -> None:
+    count = 6
+    fleet = fleet_of(
+        count,
+        ("A12",),
+        samples=20,
+        verdict=["reject", *["accept"] * 5],
+        landing_approaches=[2.0, 1.0, *[math.nan] * 4],
+        landing_unstable_approaches=[1.0, 0.0, *[math.nan] * 4],
+        landing_criteria_not_met=["speed sink_rate", *[""] * 5],
+        has_lost_data=[False, True, *[False] * 4],
+        health_verdict=["", "", "fail", "pass", "warn", ""],
+        health_sentence=["", "", "vibration high", "", "", ""],
+        duration_s=[3725.0] * count,
+        trajectory_state=["accepted"] * count,
+        source=["a.ulg"] * count,
+    )
+    page = page_of(tmp_path, fleet)
+    ids = fleet.flights["flight_id"].tolist()
+    first = page.text.split("Every flight of the fleet")[0]
+    assert f"Rejected: {ids[0]}." in first and f"Approach not stabilised: {ids[0]}." in first
+    assert f"Data lost: {ids[1]}." in first and f"Health failed: {ids[2]}." in first
+    assert "1 rejected · 1 approach not stabilised · 1 flight with failed health · 1 flight with lost data" in first
+    heads = [one.title for one in flights.heads_of(fleet)]
+    assert heads[-5:] == ["Duration", "Approaches", "Health", "Trajectory", "Remarks"]
+    rows = cells((tmp_path / PAGE).read_text(encoding="utf-8"))
+    assert rows[0][10:14] == ["1:02:05", "▲ 2 (1)", "—", "✓ accepted"] and "a.ulg" in rows[0][15]
+    assert "1 approach not stabilised (last: speed, sink rate)" in rows[0][14] and "vibration high" in rows[2][14]
+    bare = fleet_of(3, ("A12",), samples=20, error_deg=[math.nan] * 3)
+    assert "Error, °" not in [one.title for one in flights.heads_of(bare)]
 
 
 def test_only_the_script_of_the_report_may_run(html: str) -> None:
@@ -343,6 +392,19 @@ def test_the_table_sorts_by_number_and_missing_stays_last(tmp_path: Path, chromi
         chromium.run("document.querySelectorAll('#flights-table button')[4].click()")
         shown = chromium.run("document.documentElement.outerHTML")
         assert [row[4] for row in cells(shown)] == expected.split()
+
+
+def test_every_table_sorts(tmp_path: Path, chromium: Browser) -> None:
+    page_of(tmp_path, fleet_of(60, not_in_fleet=MISSING))
+    chromium.open(tmp_path / PAGE)
+    table = "Array.from(document.querySelectorAll('#aircraft table'))[0]"
+    for sign in (1, -1):
+        chromium.run(f"{table}.querySelectorAll('button')[4].click()")
+        shown = chromium.run(f"Array.from({table}.tBodies[0].rows).map(row => row.cells[4].textContent)")
+        values = [sign * float(text.replace("−", "-")) for text in shown]
+        assert len(values) == 3 and values == sorted(values)
+    assert chromium.run(f"{table}.querySelectorAll('th')[4].getAttribute('aria-sort')") == "descending"
+    assert not chromium.complaints()
 
 
 def test_without_typst_the_page_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,7 @@ from groundstation.results.fleet import FleetResults
 
 
 def _has_changes(fleet: FleetResults) -> bool:
-    return bool(fleet.change_points)
+    return bool(fleet.change_points or fleet.slopes)
 
 
 def _has_outliers(fleet: FleetResults) -> bool:

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from groundstation.chapters.fleet import slopes
 from groundstation.chapters.fleet.chapter import FleetChapter
 from groundstation.chapters.fleet.common import aircraft_name, day, figure_of, plural, title_of, verdict_words
 from groundstation.chapters.gates import VERDICTS
@@ -38,7 +39,7 @@ def build(fleet: FleetResults, chapters: Iterable[FleetChapter]) -> Front:
         pairs,
         verdict=verdict,
         headline=headline,
-        sentences=(*_changes(fleet), _judged(fleet)) if len(fleet) else (),
+        sentences=(*_flights(fleet), *_changes(fleet), _judged(fleet)) if len(fleet) else (),
         figures=tuple(figure for chapter in chapters for figure in chapter.figures(fleet)),
     )
 
@@ -75,12 +76,19 @@ def _attention(fleet: FleetResults) -> tuple[Mark, str]:
     flights = fleet.flights
     outliers = len({one.flight_id for one in fleet.outliers})
     rejected = int(np.sum(flights["verdict"] == "reject"))
+    unstable = int(np.nansum(flights["landing_unstable_approaches"]))
+    lost, unhealthy = int(np.sum(flights["has_lost_data"])), int(np.sum(flights["health_verdict"] == "fail"))
     off = int(np.sum(flights["units_verdict"] == "off"))
     failed = sum(one.kind == "failed" for one in fleet.not_in_fleet) + int(np.sum(flights["status"] == "failed"))
     counted = (
         (len(fleet.change_points), "change of level", "changes of level"),
+        (len(slopes.sloping(fleet)), "slope", "slopes"),
         (off, "flight with an INS off", "flights with an INS off"),
-        *((rejected, "rejected", "rejected"), (outliers, "outlier", "outliers"), (failed, "log failed", "logs failed")),
+        (rejected, "rejected", "rejected"),
+        (unstable, "approach not stabilised", "approaches not stabilised"),
+        (unhealthy, "flight with failed health", "flights with failed health"),
+        (lost, "flight with lost data", "flights with lost data"),
+        *((outliers, "outlier", "outliers"), (failed, "log failed", "logs failed")),
     )
     told = [plural(*one) for one in counted if one[0]]
     if told:
@@ -89,7 +97,25 @@ def _attention(fleet: FleetResults) -> tuple[Mark, str]:
         return Mark("unknown", "Nothing here"), "No log gave a flight"
     if not np.isfinite(flights["error_deg"]).any():
         return Mark("unknown", "Not assessable"), "No flight has a heading error"
-    return Mark("good", "Quiet"), "No outlier, no change of level, nothing rejected or failed"
+    return Mark("good", "Quiet"), "No outlier, no change of level, no slope, nothing rejected or failed"
+
+
+def _flights(fleet: FleetResults) -> list[str]:
+    """Return the names of the flights that were rejected, flew unstable approaches or lost data."""
+    flights = fleet.flights
+    kinds = (
+        ("Rejected", flights["verdict"] == "reject"),
+        ("Approach not stabilised", flights["landing_unstable_approaches"] > 0),
+        ("Health failed", flights["health_verdict"] == "fail"),
+        ("Data lost", flights["has_lost_data"].astype(np.bool_)),
+    )
+    return [f"{title}: {_some(flights['flight_id'][chosen].tolist())}." for title, chosen in kinds if chosen.any()]
+
+
+def _some(names: list[str]) -> str:
+    shown = [aircraft_name(name) for name in names[:MOST_CHANGES]]
+    more = len(names) - len(shown)
+    return ", ".join(shown) + (f" and {number(more, 0)} more" if more else "")
 
 
 def _changes(fleet: FleetResults) -> list[str]:
@@ -98,7 +124,9 @@ def _changes(fleet: FleetResults) -> list[str]:
         f"{day(np.datetime64(one.start_utc_ns, 'ns'))}, {figure_of(one.quantity, one.level_after)} since."
         for one in fleet.change_points[:MOST_CHANGES]
     ]
-    more = len(fleet.change_points) - len(told)
+    more, sloping = len(fleet.change_points) - len(told), slopes.sloping(fleet)
+    told += [slopes.sentence_of(one) for one in sloping[:MOST_CHANGES]]
+    more += len(sloping[MOST_CHANGES:])
     return [*told, f"{plural(more, 'change')} more in the chapter on the trend."] if more else told
 
 

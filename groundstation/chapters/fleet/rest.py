@@ -68,6 +68,7 @@ def method(fleet: FleetResults) -> Section:
             "ranks, split in two repeatedly",
             "Pettitt (1979), Scott and Knott (1974); p from random orders",
         ),
+        ("Slope", "median over all pairs", "Theil (1950), Sen (1968); called where a line explains a change as well"),
         ("Control limits", "level ± L σ", "σ from the median of successive differences; L is 3 for a long series"),
         ("Outlier", "value − median over 1.4826 MAD", "one limit for the whole fleet (Bonferroni)"),
         ("Share inside", "exact interval", "Clopper and Pearson (1934)"),

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.chapters.fleet import slopes
 from groundstation.chapters.fleet.common import (
     aircraft_name,
     day,
@@ -11,7 +12,8 @@ from groundstation.chapters.fleet.common import (
 )
 from groundstation.chapters.parts import Cell, Figure, Grid, Head, Note, Part, Section
 from groundstation.chapters.wording import number, significant
-from groundstation.results.fleet import ChangePoint, FleetResults
+from groundstation.results.fleet import FleetResults
+from groundstation.results.fleet_trends import ChangePoint
 
 QUANTITIES = {
     "error_deg": "error, °",
@@ -32,7 +34,7 @@ def build(fleet: FleetResults) -> Section:
         needed = f"{number(fewest, 0)} flights" if fewest is not None else "more flights"
         text = f"No aircraft has the {needed} with a time that a trend needs."
         return Section("trend", "Trend over time", LEAD, (Note(text, "unknown"),))
-    parts: list[Part | None] = [_changes(fleet)]
+    parts: list[Part | None] = [_changes(fleet), slopes.grid(fleet)]
     for quantity in QUANTITIES:
         parts += [Figure("fleet.trend", quantity), _levels(fleet, quantity)]
     return Section("trend", "Trend over time", LEAD, tuple(part for part in parts if part is not None))

@@ -1,4 +1,4 @@
-"""Statistics from the table of flights: by aircraft, trend, outliers, calibration."""
+"""Statistics from the table of flights: by aircraft, outliers, calibration."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -7,36 +7,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.methods.fleet.aircraft import mean_over_flights
-from groundstation.methods.fleet.changes import ChangeSettings, ControlChart, control_chart
+from groundstation.methods.fleet.changes import ChangeSettings
 from groundstation.methods.fleet.moments import Moments, merged, moments_of
 from groundstation.methods.fleet.outliers import FALSE_OUTLIERS, FEWEST, find_outliers
+from groundstation.methods.fleet.trends import groups_of, scaled, unscaled
 from groundstation.methods.intervals import share_interval
-from groundstation.results.arrays.fleet import FleetChecks, FleetTrend
-from groundstation.results.arrays.typed import joined
+from groundstation.results.arrays.fleet import FleetChecks
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet import (
     WHOLE_FLEET,
     AircraftRow,
-    ChangePoint,
     FittedNormal,
     FleetCalibration,
     OutlierRow,
-    TrendQuantity,
 )
 
 FloatArray = NDArray[np.float64]
 PIT_BINS = 10
 
-# Figures that are positive and skewed are judged by their logarithm.
-OF_AUTOPILOTS: tuple[TrendQuantity, ...] = (
-    *("health_vibration_mps2", "health_hdop", "health_test_ratio"),
-    *("onboard_heading_rms_deg", "onboard_tilt_rms_deg"),
-)
-POSITIVE = {
-    *("standard_error_deg", "estimate_sd_deg", "radial_error_rate_fit_nmiph", "forecast_60min_rms_m"),
-    *OF_AUTOPILOTS,
-}
-TRENDS: tuple[TrendQuantity, ...] = ("error_deg", "radial_error_rate_fit_nmiph", *OF_AUTOPILOTS)
 LOOKED_AT: Mapping[str, str] = {
     "error_deg": "heading error, deg",
     "standard_error_deg": "standard error of the heading error, deg",
@@ -74,12 +62,6 @@ def stated_rates(settings: ChangeSettings) -> dict[str, float]:
         "fewest_flights_for_a_trend": settings.fewest,
         "fewest_flights_for_outliers": FEWEST,
     }
-
-
-def groups_of(flights: FigureData) -> dict[str, NDArray[np.intp]]:
-    """Rows of each named aircraft, by name."""
-    names = flights["aircraft"]
-    return {name: np.flatnonzero(names == name) for name in np.unique(names).tolist() if name}
 
 
 def normals_of(aircraft: Sequence[str], moments: Sequence[Moments]) -> tuple[FittedNormal, ...]:
@@ -134,68 +116,6 @@ def _aircraft_row(name: str, flights: FigureData, rows: NDArray[np.intp]) -> Air
     )
 
 
-def _scaled(quantity: str, value: FloatArray) -> FloatArray:
-    """The figure, or the logarithm of one that is positive (NaN where it is not)."""
-    if quantity not in POSITIVE:
-        return value
-    return np.log(np.where(value > 0.0, value, np.nan))
-
-
-def _unscaled(quantity: str, value: FloatArray) -> FloatArray:
-    with np.errstate(over="ignore"):  # a limit of absurd figures may be infinite
-        return np.asarray(np.exp(value) if quantity in POSITIVE else value)
-
-
-def trends(flights: FigureData, settings: ChangeSettings) -> tuple[FleetTrend, tuple[ChangePoint, ...]]:
-    """Return control charts and changes of every aircraft and quantity.
-
-    Those with enough flights that have a time are charted.
-    """
-    charted = [FleetTrend.empty()]
-    changes: list[ChangePoint] = []
-    for name, rows in groups_of(flights).items():
-        for quantity in TRENDS:
-            value = _scaled(quantity, flights[quantity][rows])
-            timed = rows[np.isfinite(value) & ~np.isnat(flights["start_utc"][rows])]
-            timed = timed[np.argsort(flights["start_utc"][timed], kind="stable")]
-            value = _scaled(quantity, flights[quantity][timed])
-            chart = control_chart(value, settings=settings)
-            if chart is None:
-                continue
-            own = FleetTrend(
-                aircraft=np.full(len(timed), name),
-                quantity=np.full(len(timed), quantity),
-                flight_id=flights["flight_id"][timed],
-                start_utc=flights["start_utc"][timed],
-                value=flights[quantity][timed],
-                level=_unscaled(quantity, chart.level),
-                low=_unscaled(quantity, chart.low),
-                high=_unscaled(quantity, chart.high),
-                is_outside=chart.is_outside(value),
-            )
-            charted.append(own)
-            changes += _change_points(name, quantity, own, chart)
-    return joined(charted), tuple(changes)
-
-
-def _change_points(name: str, quantity: TrendQuantity, own: FleetTrend, chart: ControlChart) -> list[ChangePoint]:
-    edges = [0, *(change.index for change in chart.changes), len(own)]
-    return [
-        ChangePoint(
-            aircraft=name,
-            quantity=quantity,
-            flight_id=str(own.flight_id[change.index]),
-            start_utc_ns=int(own.start_utc[change.index].astype(np.int64)),
-            flights_before=change.index - before,
-            flights_after=after - change.index,
-            level_before=float(own.level[change.index - 1]),
-            level_after=float(own.level[change.index]),
-            p_value=change.p_value,
-        )
-        for change, before, after in zip(chart.changes, edges[:-2], edges[2:], strict=True)
-    ]
-
-
 def outliers(flights: FigureData) -> tuple[OutlierRow, ...]:
     """Find flights with a figure far from those of the same aircraft, by flight id.
 
@@ -203,12 +123,12 @@ def outliers(flights: FigureData) -> tuple[OutlierRow, ...]:
     """
     aircraft = groups_of(flights)
     keys = [(quantity, name) for quantity in LOOKED_AT for name in aircraft]
-    groups = {"\n".join(key): _scaled(key[0], flights[key[0]][aircraft[key[1]]]) for key in keys}
+    groups = {"\n".join(key): scaled(key[0], flights[key[0]][aircraft[key[1]]]) for key in keys}
     found = []
     for one in find_outliers(groups):
         quantity, name = one.group.split("\n", 1)
         row = aircraft[name][one.index]
-        value, typical = float(flights[quantity][row]), float(_unscaled(quantity, np.asarray(one.typical)))
+        value, typical = float(flights[quantity][row]), float(unscaled(quantity, np.asarray(one.typical)))
         reason = (
             f"{LOOKED_AT[quantity]}: {value:.4g}, usual for this aircraft {typical:.4g} ({one.z:+.1f} robust sigma)"
         )

@@ -117,7 +117,9 @@ def find_changes(value: FloatArray, *, settings: ChangeSettings | None = None) -
     return tuple(sorted(found, key=lambda change: change.index))
 
 
-def control_chart(value: FloatArray, *, settings: ChangeSettings | None = None) -> ControlChart | None:
+def control_chart(
+    value: FloatArray, *, settings: ChangeSettings | None = None, changes: tuple[Change, ...] | None = None
+) -> ControlChart | None:
     """Draw the control chart of individual flights, with a level of its own between changes.
 
     limits = level +- L sigma; sigma from the median of successive differences within levels, L such that a flight of a
@@ -128,16 +130,18 @@ def control_chart(value: FloatArray, *, settings: ChangeSettings | None = None) 
     value : ndarray, shape (n,)
         In order of time, finite.
     settings : ChangeSettings, optional
+    changes : tuple of Change, optional
+        Where they are known already.
 
     Returns
     -------
-    Chart or None
+    ControlChart or None
         None for a series that is too short.
     """
     settings = settings or ChangeSettings()
     if len(value) < settings.fewest:
         return None
-    changes = find_changes(value, settings=settings)
+    changes = find_changes(value, settings=settings) if changes is None else changes
     starts = [change.index for change in changes]
     level = np.concatenate([np.full(len(part), np.median(part)) for part in np.split(value, starts)])
     within = np.delete(np.diff(value), [start - 1 for start in starts])

@@ -78,14 +78,14 @@ def series_of(
     limits = settings.changes
     shown = np.log(np.maximum(value, SMALLEST)) if is_positive else value
     found, is_sloped = find_changes(shown, settings=limits), False
-    curve = _curve_of(day, value, shown, is_positive=is_positive) if found else None
+    curve = curve_of(day, value, shown, is_positive=is_positive) if found else None
     if curve is not None and _chance_of_steps(day, shown, curve, settings) > settings.false_steps:
         found, is_sloped = find_changes(shown - curve, settings=limits), True
     since = found[-1].index if found else 0
     return UnitSeries(found, line_of(day[since:], value[since:]), since, is_sloped)
 
 
-def _curve_of(day: FloatArray, value: FloatArray, shown: FloatArray, *, is_positive: bool) -> FloatArray | None:
+def curve_of(day: FloatArray, value: FloatArray, shown: FloatArray, *, is_positive: bool) -> FloatArray | None:
     """Return the line through a series.
 
     Of a positive one it is that of values or of logarithms, whichever is nearer.
@@ -160,6 +160,13 @@ def crossing_of(day: FloatArray, value: FloatArray, limit: float) -> Crossing:
         min(known) if known else None,
         None if None in latest else max(one for one in latest if one is not None),
     )
+
+
+def line_crossing(line: Line, now: float, limit: float) -> Crossing:
+    """Return when a rising line reaches a limit, from ``now`` on."""
+    time = now + np.arange(0.0, HORIZON_DAYS, STEP_DAYS)
+    low, high = line.bounds(time)
+    return Crossing(_first(time, line.at(time), limit), _first(time, high, limit), _first(time, low, limit))
 
 
 def _first(time: FloatArray, line: FloatArray, limit: float) -> float | None:

@@ -27,10 +27,14 @@ def build(fleet: FleetResults) -> Section:
 
 
 def figures(fleet: FleetResults) -> tuple[KeyFigure, ...]:
-    """Return the mean error of the whole fleet."""
+    """Return the mean error of an aircraft; of several the lowest and the highest."""
     whole = fleet.by_aircraft[0] if fleet.by_aircraft else None
     if whole is None or whole.mean_deg is None:
         return ()
+    means = [row.mean_deg for row in fleet.by_aircraft[1:] if row.mean_deg is not None]
+    if len(means) > 1:
+        span = span_of((min(means), max(means)), 3, "°")
+        return (("Heading error", span, f"means of {plural(len(means), 'aircraft', 'aircraft')}"),)
     rejected = whole.assessed - whole.averaged
     remark = f"mean over {plural(whole.averaged, 'flight')}"
     remark += f"; {number(rejected, 0)} rejected left out" if rejected else ""
@@ -59,6 +63,7 @@ def _table(fleet: FleetResults) -> Grid:
             number(row.samples, 0),
         )
         for place, row in enumerate(fleet.by_aircraft)
+        if place or len(fleet.by_aircraft) < 3  # a mean over several aircraft is of none of them
     ]
     caption = (
         "Every flight counts as one. Between flights: σ of the true errors, without what the flights' own standard "

@@ -40,6 +40,7 @@ def _normals(fleet: FleetResults) -> Grid:
             *(angle(one.mean_deg, ""), number(one.sigma_deg, 3)),
         )
         for place, one in enumerate(fleet.normals)
+        if place or len(fleet.normals) < 3
     ]
     caption = "Merged from number, mean and sum of squares of each flight: the same as all samples in one array."
     return Grid("Fitted normals", heads, rows, caption)

@@ -31,15 +31,18 @@ def overlay(fleet: FleetResults) -> Plot:
     marks, top = _flights(densities, np.arange(len(densities)), MOST_LINES, roles, is_named=True)
     x, y = _outline(densities, densities.pooled_per_deg)
     marks.append(Curve(x=x, y=y, role="faint", name="all samples", dash="dashed", emphasis="bold"))
+    normal = normal if len(fleet.normals) < 3 else None
     marks += _normal(normal, low, high, "fitted normal")
-    fitted = "" if normal is None else f" with mean {angle(normal.mean_deg)} and σ {number(normal.sigma_deg, 3, '°')}"
+    fitted = ""
+    if normal is not None:
+        told = f"mean {angle(normal.mean_deg)} and σ {number(normal.sigma_deg, 3, '°')}"
+        fitted = f"; black: the normal fitted to them with {told}"
     across = Axis("INS heading − GNSS track, °", low=low, high=high)
     return Plot(
         "fleet.densities",
         "Density of every flight",
-        f"{_how_drawn(len(densities), roles)} Dashed: all {number(int(densities.samples.sum()), 0)} samples; "
-        f"black: the normal fitted to them{fitted}. Where the flights' heading errors differ, the normal of all is "
-        f"wider than any of theirs.{_beyond(densities, low, high)}",
+        f"{_how_drawn(len(densities), roles)} Dashed: all {number(int(densities.samples.sum()), 0)} samples"
+        f"{fitted}.{_beyond(densities, low, high)}",
         "Densities of the heading error of the flights over each other with the fitted normal curve.",
         one_panel(Panel(marks, across, Axis("probability density, 1/°", low=0.0, high=1.08 * top)), 69.0),
     )

@@ -17,10 +17,7 @@ def forest(fleet: FleetResults) -> Plot:
     by_name = {row.aircraft: row for row in assessed(fleet)}
     shown = [by_name[name] for name in rows_shown({row.aircraft: row.averaged for row in by_name.values()})]
     error, owner = fleet.flights["error_deg"], fleet.flights["aircraft"]
-    whole = fleet.by_aircraft[0].mean_deg
     marks: list[AnyMark] = [Limit(value=0.0, is_upright=True, role="faint", dash="dotted", emphasis="faint")]
-    if whole is not None:
-        marks.append(Limit(value=whole, is_upright=True, role="ink", dash="", emphasis="faint"))
     for place, row in enumerate(shown):
         own = finite(error[owner == row.aircraft])
         marks.append(Dots(x=own, y=np.full(len(own), float(place)), role="unused", emphasis="bold"))
@@ -31,8 +28,7 @@ def forest(fleet: FleetResults) -> Plot:
         "fleet.forest",
         "Mean error of each aircraft",
         "Green: mean over the flights with its 95 % interval, from the spread between flights; grey: single flights, "
-        "the rejected among them. "
-        f"Line: mean over the whole fleet.{left_out(len(shown), len(by_name))}",
+        f"the rejected among them.{left_out(len(shown), len(by_name))}",
         "Forest plot of the mean heading error of each aircraft with its 95 percent interval.",
         one_panel(Panel(marks, Axis("heading error, °"), name_axis(names), legend=""), ROW_MM * (len(shown) + 1)),
     )

@@ -3,7 +3,7 @@
 The page draws one over dates, the recording over the numbers of flights: there flights without a time have a place.
 """
 
-from collections.abc import Sequence
+from collections.abc import Set
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from groundstation.chapters.plots.fleet.common import Places, date_axis, log_lim
 from groundstation.plots.marks import AnyMark, Band, Curve, Dots, Floats, Limit, Role
 from groundstation.plots.plot import Axis, Panel, Plot, Row
 from groundstation.plots.ranges import finite, padded
+from groundstation.results.arrays.fleet import FleetTrend
 from groundstation.results.figures import numbers
 from groundstation.results.fleet import FleetResults
 
@@ -52,7 +53,8 @@ def charts(fleet: FleetResults, quantity: str) -> Plot | None:
     return Plot(
         f"fleet.trend.{quantity}",
         f"Control chart of the {title_of(quantity)}",
-        "Line: level, the median between changes; dashed: control limits of single flights; red: outside them. "
+        "Line: level, the median between changes, or the slope; dashed: control limits of single flights; red: "
+        "outside them. "
         f"{SHADED if quantity == HEADING else ''}Numbered: the first flight of a new level.{more}",
         f"Control charts of the {title_of(quantity)} by aircraft over time.",
         tuple(Row((panel,), PANEL_MM, shares_x=panel is not panels[-1]) for panel in panels),
@@ -96,7 +98,7 @@ def chart(
     if quantity == HEADING:
         ends = numbers(flights, "confidence95_low_deg")[rows], numbers(flights, "confidence95_high_deg")[rows]
         marks += _intervals(time, ends, np.sort(at), f"{title}, 95 %", role)
-    marks += _levels(places(own.flight_id), own.level, own.low, own.high)
+    marks += _levels(places(own.flight_id), own, {one.flight_id for one in changed})
     if len(at):
         after = np.array([one.level_after for one in changed])
         marks.append(Dots(x=at, y=after, role="ink", name="new level", emphasis="bold"))
@@ -139,19 +141,14 @@ def _intervals(time: Floats, ends: tuple[Floats, Floats], firsts: Floats, title:
     return bands
 
 
-def _levels(time: Floats, level: Floats, low: Floats, high: Floats) -> list[AnyMark]:
-    """Level and limits of each run between changes, from its first to its last flight."""
+def _levels(time: Floats, own: FleetTrend, firsts: Set[str]) -> list[AnyMark]:
+    """Level and limits of each run between changes, from its first to its last flight: flat, or along a slope."""
     marks: list[AnyMark] = []
-    for place, run in enumerate(_runs(level, low, high) if len(level) else ()):
-        span = np.array([time[run[0]], time[run[-1]]])
-        for limit, title in ((low, ""), (high, "" if place else "limits")):
-            y = np.full(2, limit[run[0]])
-            marks.append(Curve(x=span, y=y, role="limit", name=title, dash="dashed", emphasis="thin"))
-        marks.append(Curve(x=span, y=np.full(2, level[run[0]]), role="ink", name="" if place else "level"))
+    starts = [place for place, name in enumerate(own.flight_id.tolist()) if name in firsts]
+    for place, run in enumerate(np.split(np.arange(len(time)), starts) if len(time) else ()):
+        is_flat = bool(np.all(own.level[run] == own.level[run[0]]))
+        run = run[[0, -1]] if is_flat else run
+        for limit, title in ((own.low, ""), (own.high, "" if place else "limits")):
+            marks.append(Curve(x=time[run], y=limit[run], role="limit", name=title, dash="dashed", emphasis="thin"))
+        marks.append(Curve(x=time[run], y=own.level[run], role="ink", name="" if place else "level"))
     return marks
-
-
-def _runs(*columns: Floats) -> Sequence[NDArray[np.intp]]:
-    """Return stretches in which no column changes (NaN equals NaN)."""
-    same = [(column[1:] == column[:-1]) | (np.isnan(column[1:]) & np.isnan(column[:-1])) for column in columns]
-    return np.split(np.arange(len(columns[0])), np.flatnonzero(~np.logical_and.reduce(same)) + 1)

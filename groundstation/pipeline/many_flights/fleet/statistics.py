@@ -17,6 +17,7 @@ from groundstation.methods.fleet.deviation import deviations
 from groundstation.methods.fleet.installations import installation_flights, installation_rows
 from groundstation.methods.fleet.moments import Moments
 from groundstation.methods.fleet.skill import SkillMerger
+from groundstation.methods.fleet.trends import trends
 from groundstation.methods.fleet.units import FlownUnit, UnitHistories, histories_of
 from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS
 from groundstation.pipeline.many_flights.fleet.rows import session_row, share_of
@@ -166,7 +167,7 @@ def _results(found: Scan, flights: FigureData, shares: Any, unread: list[NotInFl
     aircraft = flights["aircraft"][is_sampled].tolist()
     cells = _parts(found, shares, ("sample_cell", "sample_count"))
     histograms = compress(chain.from_iterable(map(histograms_of, cells)), is_sampled.tolist())
-    trend, changes = answer.trends(flights, settings)
+    trend = trends(flights, settings, limits_in(found.out)[0])
     merger, skill_flights, checks = _details(found, flights, shares)
     units = _units(found, flights, shares)
     read = installations_in(found.out)
@@ -182,8 +183,9 @@ def _results(found: Scan, flights: FigureData, shares: Any, unread: list[NotInFl
         densities=densities_of(flights["flight_id"][is_sampled].tolist(), aircraft, moments, histograms),
         normals=answer.normals_of(aircraft, moments),
         by_aircraft=answer.by_aircraft(flights),
-        trend=trend,
-        change_points=changes,
+        trend=trend.charts,
+        change_points=trend.changes,
+        slopes=trend.slopes,
         skill=merger.rows(),
         skill_flights=skill_flights,
         calibration=answer.calibrations(checks),

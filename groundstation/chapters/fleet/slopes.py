@@ -1,0 +1,87 @@
+"""Parts: slopes of the charted quantities of aircraft, in sentences and in a table."""
+
+import numpy as np
+
+from groundstation.chapters.fleet.common import aircraft_name, day, figure_of, title_of
+from groundstation.chapters.parts import Cell, Grid, Head, Mark
+from groundstation.chapters.wording import ABSENT, number
+from groundstation.results.fleet import FleetResults
+from groundstation.results.fleet_trends import SlopeRow
+
+CAPTION = (
+    "Flights since the last change of level, six or more. Slope: median over all pairs of flights; in brackets 95 %, "
+    "from the scatter of the flights. Level now: the line at the last flight. A slope is called where the flights "
+    "show a change that a line explains as well as a step does. Limits: --unit-limits; of the test ratio 1. The date "
+    "continues the line."
+)
+
+
+def sloping(fleet: FleetResults) -> list[SlopeRow]:
+    """Return the lines that are slopes."""
+    return [one for one in fleet.slopes if one.is_slope]
+
+
+def sentence_of(one: SlopeRow) -> str:
+    """Return a slope as a sentence: how fast, how sure, since when, when it reaches its limit."""
+    slope, low, high = (figure_of(one.quantity, value) for value in one.per_flight)
+    told = (
+        f"{aircraft_name(one.aircraft)}: {title_of(one.quantity)} {_verb(one)} by {slope} a flight (95 % {low} … "
+        f"{high}) over {number(one.flights, 0)} flights since {_date(one.since_utc_ns)}, now "
+        f"{figure_of(one.quantity, one.level)}"
+    )
+    due = _due(one)
+    return f"{told}; {due}." if due else f"{told}."
+
+
+def grid(fleet: FleetResults) -> Grid | None:
+    """Return the table of lines, slopes first; None without any."""
+    if not fleet.slopes:
+        return None
+    heads = (
+        *(Head("Aircraft"), Head("Quantity"), Head("Flights", True), Head("Slope a flight", True)),
+        *(Head("Level now", True), Head("State"), Head("Limit", True), Head("Reached on")),
+    )
+    order = sorted(fleet.slopes, key=lambda one: not one.is_slope)
+    return Grid("Slopes", heads, [_row(one) for one in order], CAPTION)
+
+
+def _row(one: SlopeRow) -> tuple[Cell, ...]:
+    slope, low, high = (figure_of(one.quantity, value) for value in one.per_flight)
+    level, least, most = (figure_of(one.quantity, value) for value in (one.level, one.level_low, one.level_high))
+    state: Cell = Mark("bad", "beyond") if one.is_over else Mark("warn", _verb(one)) if one.is_slope else "no slope"
+    due = ABSENT
+    if one.due_utc_ns is not None:
+        due = f"{_date(one.due_utc_ns)} ({_date(one.due_earliest_utc_ns)} … {_end(one)})"
+    return (
+        *(aircraft_name(one.aircraft), title_of(one.quantity), number(one.flights, 0)),
+        *(f"{slope} ({low} … {high})", f"{level} ({least} … {most})", state),
+        *(ABSENT if one.limit is None else _limit(one), due),
+    )
+
+
+def _limit(one: SlopeRow) -> str:
+    return figure_of(one.quantity, one.limit).lstrip("+")
+
+
+def _end(one: SlopeRow) -> str:
+    return "no sure end" if one.due_latest_utc_ns is None else _date(one.due_latest_utc_ns)
+
+
+def _verb(one: SlopeRow) -> str:
+    return "rises" if one.slope_per_year > 0.0 else "falls"
+
+
+def _due(one: SlopeRow) -> str:
+    """Return when the limit is reached; empty without a limit."""
+    if one.limit is None:
+        return ""
+    limit = _limit(one)
+    if one.is_over:
+        return f"beyond its limit of {limit}"
+    if one.due_utc_ns is None:
+        return f"does not reach {limit} in ten years"
+    return f"reaches {limit} on {_date(one.due_utc_ns)} (95 % {_date(one.due_earliest_utc_ns)} … {_end(one)})"
+
+
+def _date(time_ns: int | None) -> str:
+    return ABSENT if time_ns is None else day(np.datetime64(time_ns, "ns"))
