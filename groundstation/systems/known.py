@@ -75,7 +75,7 @@ class AircraftData:
         ``rolls``, ``flies``, ``walks`` or ``floats``; empty: as the log says or shows. What rolls is always on the
         ground: nothing need prove it.
     always_on_ground : bool
-        The same as a vehicle that rolls.
+        True: it is always on the ground, as what rolls is.
     """
 
     antenna_arm_m: float | None = number(None, -50.0, 50.0)

@@ -121,7 +121,7 @@ class HeadingSettings:
 
     # Lever arm and time offset
 
-    # When_observed: GNSS is shifted by its latency behind the INS, estimated from motion; never: it is not.
+    # when_observed: GNSS is shifted by its latency behind the INS, estimated from motion; never: it is not.
     use_latency: UseLatency = "when_observed"
     # Turns slower than this are not used to find the lever arm of the antenna; chosen.
     arm_speed_min_mps: float = number(3.0, 0.0)

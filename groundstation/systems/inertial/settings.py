@@ -20,11 +20,11 @@ class InertialSettings:
     # Class of the INS, by which noise and priors are set: a shipped name, or a file; auto: the aircraft file's, else
     # navigation.
     ins_class: str = "auto"
-    # Exact: the model is carried by its matrix exponential; first_order: by short steps of I + A dt.
+    # exact: the model is carried by its matrix exponential; first_order: by short steps of I + A dt.
     transition: Literal["exact", "first_order"] = "exact"
-    # Separate: north and east channels apart; coupled: together; whose last estimate is forecast.
+    # Model whose last estimate is forecast: separate has north and east channels apart, coupled has them together.
     model: Literal["separate", "coupled"] = "coupled"
-    # Differences of INS and GNSS are averaged over such intervals; chosen.
+    # Differences of INS and GNSS are averaged over intervals of this length; chosen.
     epoch_interval_s: float = number(1.0, 0.01, 60.0)
     ins_gap_max_s: float = number(1.5, 0.0)  # INS is interpolated over no longer gap; chosen
     use_position: bool = True  # false: differences of position do not go into the filter

@@ -61,7 +61,7 @@ class MagneticFluxSettings:
     turn_bank_min_deg: float = number(3.0, 1.0, 80.0)  # least bank of a turn that shows the bank error; chosen
     fit_bank_max_deg: float = number(35.0, 2.0, 60.0)  # largest bank that the fit of the bank error uses; chosen
     turn_samples_min: int = number(20, 5, 100_000)  # fewest samples in turns for a fit of the bank error; chosen
-    # False: the reading is stated to be the valve's own, not that of a gyro it corrects: no turns are required.
+    # false: the reading is stated to be the valve's own, not that of a gyro it corrects: no turns are required.
     may_be_slaved: bool = True
     # Largest error of a heading in use: bounds the bank, and the time after a turn, that are told for use; chosen.
     use_error_max_deg: float = number(2.0, 0.1, 45.0)

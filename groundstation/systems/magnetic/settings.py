@@ -35,7 +35,7 @@ class MagneticSettings:
     track_error_max_deg: float = number(0.3, 0.001, 45.0)
     # Velocity error of GNSS in the run to lift-off, or what the receiver states if it is larger; patent.
     gnss_velocity_error_mps: float = number(0.15, 0.001, 100.0)
-    # True: taxi aligns the INS heading before the run to lift-off does; false: that run first, as in the patent.
+    # true: taxi aligns the INS heading before the run to lift-off does; false: that run first, as in the patent.
     uses_slower_taxi: bool = True
     # So much of the run is left out before lift-off: the nose is raised; chosen.
     lift_off_margin_s: float = number(3.0, 0.0, 60.0)
@@ -55,7 +55,7 @@ class MagneticSettings:
     # Largest sigma of the heading of a best trajectory that replaces that of the INS; empty: where it is surer than the
     # INS; 0: never.
     states_sigma_max_deg: float | None = number(None, 0.0, 180.0)
-    # True: the heading of an INS that GNSS corrects is taken to be free of any magnetometer.
+    # true: the heading of an INS that GNSS corrects is taken to be free of any magnetometer.
     trusts_aided_heading: bool = False
 
     # Turns and figures.

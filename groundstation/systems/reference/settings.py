@@ -23,7 +23,7 @@ class ReferenceSettings:
     arm_forward_m: float | None = number(None, -200.0, 200.0)
     # Arm from the point of the reference to the GNSS antenna of the log, right; empty: estimated.
     arm_right_m: float | None = number(None, -200.0, 200.0)
-    # When_observed: an estimated arm is taken out of the errors where the turns show it; never: it stays in them.
+    # when_observed: an estimated arm is taken out of the errors where the turns show it; never: it stays in them.
     use_arm: UseArm = "when_observed"
     gap_max_s: float = number(1.5, 0.01, 60.0)  # the reference is interpolated over no longer gap; chosen
     samples_min: int = number(10, 2, 100_000)  # fewest samples that log and reference have together; chosen

@@ -11,11 +11,19 @@ class AidSettings:
 
     Parameters
     ----------
-    use_barometer, use_wheel_speed, use_magnetic_heading : bool
-        False: the aid is not used. Wheels serve what rolls alone, a magnetic heading alone where the aircraft file
-        states the deviation of its compass.
-    barometer_topic, wheel_topic, compass_topic : str
-        Named by the user; empty: chosen.
+    use_barometer : bool
+        False: barometric height is not used.
+    use_wheel_speed : bool
+        False: the speed of wheels is not used. It serves what rolls alone.
+    use_magnetic_heading : bool
+        False: a magnetic heading is not used. It serves alone where the aircraft file states the deviation of its
+        compass.
+    barometer_topic : str
+        Topic of the barometer; empty: the first that agrees with GNSS.
+    wheel_topic : str
+        Topic of the speed of wheels; empty: the first that agrees with GNSS.
+    compass_topic : str
+        Topic of the magnetic heading; empty: chosen by the tool.
     """
 
     use_barometer: bool = True

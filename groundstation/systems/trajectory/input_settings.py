@@ -11,8 +11,10 @@ class InputSettings:
 
     Parameters
     ----------
-    imu_topic, gnss_topic : str
-        Named by the user; empty: chosen.
+    imu_topic : str
+        Topic of the inertial unit; empty: chosen by the tool.
+    gnss_topic : str
+        Topic of the GNSS receiver; empty: chosen by the tool.
     """
 
     imu_topic: str = ""
