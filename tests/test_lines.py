@@ -83,7 +83,7 @@ def test_open_is_refused_before_anything_is_computed(
     assert code in (1, 2) and len(err.splitlines()) == 1 and not out.exists()
 
 
-def test_names_are_completed(tmp_path: Path) -> None:
+def test_names_are_completed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert "taxi-good" in completion.scenarios("taxi-g")
     assert completion.studies("hea") == ["heading"]
     assert "heading" in completion.analyses("h") and not completion.analyses("nothing")
@@ -91,3 +91,5 @@ def test_names_are_completed(tmp_path: Path) -> None:
     assert all(not name.startswith("session") for name in completion.plans_of("session")(""))
     (tmp_path / "mine.toml").touch()
     assert completion.profiles(f"{tmp_path}/m") == [f"{tmp_path}/mine.toml"]
+    monkeypatch.chdir(tmp_path)
+    assert (completion.profiles("./m"), completion.profiles("mine")) == (["./mine.toml"], ["mine.toml"])

@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 
 from groundstation.base.angles import wrap_180
-from groundstation.base.errors import GroundstationError
+from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.base.geodesy import latitude_longitude_deg, north_east_m
 from groundstation.base.runways.kept import SHIPPED, bytes_of, runways, shipped_runways, user_file
 from groundstation.base.runways.ourairports import IMPOSSIBLE, NO_COORDINATES, NOT_A_RUNWAY, read_ourairports
 from groundstation.base.runways.table import THRESHOLD_SIGMA_M, RunwayTable
 from groundstation.base.units import M_PER_FOOT
+from groundstation.cli.runways import runways_text
+from groundstation.pipeline.verbs.runways import runways_near, runways_of
 
 MOST_BYTES = 1_000_000
 HEAD = (
@@ -220,3 +222,20 @@ def test_a_damaged_table_is_a_line(what: str, tmp_path: Path, monkeypatch: pytes
     with pytest.raises(GroundstationError, match="not a table of runways") as error:
         runways()
     assert "\n" not in str(error.value)
+
+
+def test_the_table_is_printed_with_its_units(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    found = runways_near(60.187, 11.074, 1.0)
+    head, first = runways_text(found, everything=True).splitlines()[:2]
+    assert "course deg" in head and "sigma along m" in head and "sigma course deg" in head
+    assert first.split()[:2] == ["ENGM", "19R"] and first.endswith(" end")
+
+
+@pytest.mark.parametrize(("ident", "expected"), [("zzzz", "such as ENGM"), ("ENGN", "one of EN"), ("ENGM 02", "01L")])
+def test_an_unknown_airport_is_a_line_that_helps(
+    ident: str, expected: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    with pytest.raises(UsageError, match=expected):
+        runways_of(ident)

@@ -1,19 +1,22 @@
 """Pages of the site that the code itself writes: verbs, settings, findings, formats, analyses."""
 
 import ast
+import re
 from collections.abc import Iterator, Mapping
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import typer.main
 
 import groundstation
+from groundstation.base.findings import Severity
 from groundstation.cli.main import app
 from groundstation.pipeline.verbs.catalogue import catalogue
 from groundstation.pipeline.verbs.settings_list import every_setting
 
 PACKAGE = Path(groundstation.__file__).parent
+CODE = re.compile(r"[a-z_]+\.[a-z_]+[a-z]")
 
 
 def pages() -> Mapping[str, str]:
@@ -78,25 +81,57 @@ def _settings() -> str:
 
 def _findings() -> str:
     rows: dict[str, tuple[set[str], str]] = {}
+    others: list[tuple[str, str, str]] = []
     for path in sorted(PACKAGE.rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Finding"):
-                continue
-            arguments: list[Any] = [*node.args, None, None, None]
-            named = {one.arg: one.value for one in node.keywords}
-            severity, code, text = (
-                _told(named.get(name) or arguments[place]) for place, name in enumerate(("severity", "code", "text"))
-            )
+        module = ast.parse(path.read_text(encoding="utf-8"))
+        calls = [node for node in ast.walk(module) if isinstance(node, ast.Call) and _is_finding(node)]
+        told = [_arguments(node) for node in calls]
+        for severity, code, text in told:
             if "." in code and not code.startswith("..."):
-                severities, first = rows.setdefault(code, (set(), text))
-                severities.add(severity)
-                rows[code] = severities, first or text
-    told = [
+                _note(rows, severity, code, text)
+        if any(not code for _severity, code, _text in told):
+            others += _codes_elsewhere(module)
+    heads = {code.partition(".")[0] for code in rows}
+    for severity, code, text in others:
+        if code.partition(".")[0] in heads:
+            _note(rows, severity, code, text)
+    listed = [
         (f"`{code}`", ", ".join(sorted(found - {""})) or "by its size", text) for code, (found, text) in rows.items()
     ]
     return "# Codes of findings\n\nWhat a report, summary.json and `check` may say of a log, by its code.\n\n" + table(
-        ("code", "severity", "text"), sorted(told)
+        ("code", "severity", "text"), sorted(listed)
     )
+
+
+def _is_finding(node: ast.Call) -> bool:
+    return isinstance(node.func, ast.Name) and node.func.id == "Finding"
+
+
+def _arguments(node: ast.Call) -> tuple[str, str, str]:
+    """Return severity, code and text of a finding, as the code writes them."""
+    arguments: list[Any] = [*node.args, None, None, None]
+    named = {one.arg: one.value for one in node.keywords}
+    severity, code, text = (
+        _told(named.get(name) or arguments[place]) for place, name in enumerate(("severity", "code", "text"))
+    )
+    return severity, code, text
+
+
+def _note(rows: dict[str, tuple[set[str], str]], severity: str, code: str, text: str) -> None:
+    severities, first = rows.setdefault(code, (set(), text))
+    severities.add(severity)
+    rows[code] = severities, first or text
+
+
+def _codes_elsewhere(module: ast.Module) -> Iterator[tuple[str, str, str]]:
+    """Yield the codes of a module that stand by name, or in a row with their severity and text."""
+    for node in ast.walk(module):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and CODE.fullmatch(node.value):
+            yield "", node.value, ""
+        if isinstance(node, ast.Tuple) and len(node.elts) == len(("severity", "code", "text")):
+            severity, code, text = (_told(one) for one in node.elts)
+            if severity in get_args(Severity) and CODE.fullmatch(code):
+                yield severity, code, text
 
 
 def _told(node: ast.expr | None) -> str:

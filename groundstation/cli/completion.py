@@ -37,10 +37,11 @@ def profiles(incomplete: str) -> list[str]:
 
 
 def _files(incomplete: str) -> list[str]:
-    folder = Path(incomplete) if incomplete.endswith("/") else Path(incomplete).parent
+    head = incomplete[: incomplete.rfind("/") + 1]  # as typed: the shell keeps it
+    folder = Path(head or ".")
     if not folder.is_dir():
         return []
-    return sorted(name for one in folder.glob("*.toml") if (name := str(one)).startswith(incomplete))
+    return sorted(name for one in folder.glob("*.toml") if (name := head + one.name).startswith(incomplete))
 
 
 def _begin(incomplete: str, *kinds: str) -> list[str]:

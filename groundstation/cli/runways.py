@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from groundstation.base.runways.table import RunwayDirection
     from groundstation.pipeline.verbs.runways import FoundRunways, NearRunway, TableInUse
 
+MORE_HEADS = ("sigma along m", "sigma across m", "sigma course deg", "ends less length m", "row gives")
+
 runways = typer.Typer(
     help="Show runways of the table that landings are measured against, and update it.",
     epilog=examples("runways"),
@@ -134,9 +136,10 @@ def runways_text(found: "FoundRunways", *, everything: bool = False) -> str:
     if not found.found:
         return f"no runway ({found.table.version})"
     heads = [
-        *("runway", "km off", "threshold", "course", "length m", "width m", "landing m", "displaced m", "elev. m"),
+        *("runway", "km off", "threshold deg", "course deg", "length m", "width m"),
+        *("landing m", "displaced m", "elevation m"),
         *("slope %", "surface", "state"),
-        *(("along m", "across m", "course s.", "length differs m", "row gives") if everything else ()),
+        *(MORE_HEADS if everything else ()),
     ]
     rows = [heads, *(_row(one, everything=everything) for one in found.found)]
     foot = f"{found.table.version}, {found.table.licence}; not for navigation"

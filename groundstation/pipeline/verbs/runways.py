@@ -17,6 +17,7 @@ from groundstation.base.to_disk import sync_file, sync_folder
 
 FARTHEST_KM = 200.0
 MOST_SHOWN = 100
+EXPECTED = "an identifier of OurAirports such as ENGM; runways near LAT LON lists those of a place"
 
 
 @dataclass(frozen=True)
@@ -104,15 +105,17 @@ def runways_of(ident: str) -> FoundRunways:
 
     Raises
     ------
-    UnknownNameError
-        When the table has no such airport or runway.
+    UsageError
+        When the table has no such airport or runway; :class:`UnknownNameError` where similar names are known.
     """
     table, problem = usable_runways()
     airport, _, name = ident.strip().partition(" ")
     listed = table.of_airport(airport)
     if not listed:
-        likely = [str(one) for one in table.airport if str(one)[:2] == airport.upper()[:2]]
-        raise UnknownNameError("runways", airport, sorted(set(likely)))
+        likely = {str(one) for one in table.airport if str(one)[:2] == airport.upper()[:2]}
+        if not likely:
+            raise UsageError("runways", f"no {airport!r}", EXPECTED)
+        raise UnknownNameError("runways", airport, sorted(likely))
     some = [one for one in listed if not name or one.name == name.strip().upper()]
     if not some:
         raise UnknownNameError(f"runways of {airport.upper()}", name.strip(), [one.name for one in listed])
