@@ -15,7 +15,7 @@ from groundstation.systems.cooperative.smoother.smoothed import run_smoothed
 from groundstation.systems.cooperative.stations.hypotheses import FOUND, chance_of, noncentrality
 from groundstation.systems.cooperative.stations.information import EACH, station_information
 from groundstation.systems.cooperative.stations.judge import StationJudgement, judge_stations, survey_of
-from groundstation.systems.cooperative.study.station_cases import CASES, StationCase
+from groundstation.systems.cooperative.study.station_cases import CASES, KNOWN_CLOCKS, StationCase
 from groundstation.systems.cooperative.study.station_runs import drawn
 from groundstation.systems.cooperative.study.stations import study_stations
 from groundstation.tables.session import Session
@@ -141,6 +141,17 @@ def test_a_station_with_a_wrong_clock_is_told_from_one_that_stands_elsewhere() -
     assert doubt.station == 1 and doubt.left_out
     assert doubt.tests[0].error_m[0] == pytest.approx(300.0, abs=4.0 * doubt.tests[0].size_sigma_m)
     assert judgement.session.points[1].name not in set(judgement.session.ranges.source.tolist())
+
+
+def test_the_delay_of_a_station_left_out_is_inside_its_interval() -> None:
+    """One linear step about an answer that leans on the late ranges finds 133 of 150 m, sigma 5 m."""
+    case = replace(BY_NAME["delay-300"], delay_m=150.0, believed=KNOWN_CLOCKS)
+    _, session, _ = drawn(case, SEED, 2)
+    judgement = judge_stations(session, case.settings())
+    (doubt,) = (one for one in judgement.doubts if one.left_out)
+    (delay,) = doubt.tests
+    assert doubt.station == 1 and delay.size_sigma_m < 5.0
+    assert delay.error_m[0] == pytest.approx(150.0, abs=2.0 * delay.size_sigma_m)
 
 
 def test_ins_worse_than_believed_is_taken_as_it_is_and_accuses_no_station() -> None:

@@ -21,6 +21,7 @@ from groundstation.systems.cooperative.smoother.smoothed import SmoothedPoint, S
 from groundstation.systems.cooperative.stations.belief import belief_factors, raised_sigmas, with_factors
 from groundstation.systems.cooperative.stations.hypotheses import (
     CANNOT_TELL,
+    DELAY,
     SHIFT,
     UNSEEN,
     StationTest,
@@ -32,7 +33,7 @@ from groundstation.systems.cooperative.stations.hypotheses import (
 from groundstation.systems.cooperative.stations.information import EACH, StationInformation, station_information
 from groundstation.tables.session import GroundPoint, Session
 
-MOST_ROUNDS, BELIEF_ROUNDS = 4, 2
+MOST_ROUNDS, BELIEF_ROUNDS, DELAY_ROUNDS = 4, 2, 2
 Solved = tuple[StationInformation, SmoothedProblem, Prepared]
 FREE = 5.0  # sigmas of a free place, in sizes of the error found
 DATUM_TOLD = 12.0  # twice the log of the likelihood ratio of a datum from which it is told
@@ -47,7 +48,7 @@ class Doubt:
     ----------
     station : int
     tests : tuple of StationTest
-        The best first.
+        The best first; of a station left out its delay alone, about ranges less the delay.
     left_out : bool
     round : int
     place : StationTest, optional
@@ -209,7 +210,7 @@ def _doubts(found: Sequence[StationTest], number: int) -> list[Doubt]:
 def _placed(doubt: Doubt, session: Session, settings: CooperativeSettings) -> Doubt:
     """Return the doubt with the place of the station when it alone is free."""
     if doubt.left_out:
-        return doubt
+        return replace(doubt, tests=(_delayed(doubt, session, settings),))
     shift = next(test for test in doubt.tests if test.kind == SHIFT)
     points = list(session.points)
     points[doubt.station] = _freed(points[doubt.station], FREE * shift.largest_m)
@@ -217,6 +218,23 @@ def _placed(doubt: Doubt, session: Session, settings: CooperativeSettings) -> Do
     (point,) = (one for one in solved.smoothed.points if one.point == doubt.station)
     covariance = information.repetition * point.covariance_m2
     return replace(doubt, place=replace(shift, error_m=point.error_m, covariance_m2=covariance))
+
+
+def _delayed(doubt: Doubt, session: Session, settings: CooperativeSettings) -> StationTest:
+    """Return the delay of a station from ranges that it is taken off.
+
+    A test is linear about an answer that leans on the late ranges, and robust weights have them count for less.
+    """
+    delay = next(test for test in doubt.tests if test.kind == DELAY)
+    ranges = session.ranges
+    late = ranges.source == session.points[doubt.station].name
+    for _ in range(DELAY_ROUNDS):
+        on_time = replace(ranges, pseudorange_m=ranges.pseudorange_m - late * float(delay.error_m[0]))
+        information, _, _ = station_information(replace(session, ranges=on_time), settings)
+        left = [test for test in station_tests(information, [doubt.station]) if test.kind == DELAY]
+        for test in left:
+            delay = replace(delay, error_m=delay.error_m + test.error_m, covariance_m2=test.covariance_m2)
+    return delay
 
 
 def _freed(point: GroundPoint, sigma_m: float) -> GroundPoint:
