@@ -174,9 +174,9 @@ def test_the_verbs_keep_a_limit_of_time(tmp_path: Path) -> None:
 
 
 def test_conversions_apart_give_the_same_file(tmp_path: Path) -> None:
-    for name, bounds in (("a", None), ("b", ProcessLimits(300.0))):
+    for name, bounds in (("a.mcap", None), ("b.mcap", ProcessLimits(300.0))):
         assert convert_many([SHORT], tmp_path / name, bounds=bounds)[0].state == "done"
-    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+    assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
 
 
 def test_the_shorter_limit_of_time_counts_and_is_named() -> None:

@@ -132,7 +132,7 @@ def scratch(tmp_path_factory: pytest.TempPathFactory) -> Scratch:
     installed(folder, "gnss_noise", entry_points)
     (folder / "c.toml").write_text(settings, encoding="utf-8")
     log = ROOT / "sample_logs" / "taxi-good.csv"
-    run = groundstation(folder, "run", str(log), "-o", "out", "--no-pdf", "-j", "1", "--config", "c.toml")
+    run = groundstation(folder, "run", str(log), "-o", "out", "--no-pdf", "-j", "1", "--config", "c.toml", "-v")
     assert run.returncode == 0, run.stderr
     (summary,) = (folder / "out").glob("*/summary.json")
     return Scratch(folder, summary.parent, run.stdout + run.stderr)

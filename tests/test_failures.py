@@ -406,7 +406,7 @@ def test_a_run_with_failures_has_all_else_tells_and_is_mended_by_the_next(
             main(["run", str(SAMPLE), "-o", str(out), "-j", "1", "--no-pdf"])
     printed = capsys.readouterr()
     assert ended.value.code == 1
-    assert "taxi-short.csv  incomplete  " in printed.out
+    assert "  incomplete  2026" in printed.out
     lines = [line for line in printed.err.splitlines() if line.startswith("error: ")]
     assert [line.partition(" is left out: ")[2] for line in lines] == [REASON] * 5
     assert "Traceback" not in printed.err

@@ -34,12 +34,20 @@ class Lines:
         Lines in full, with what each stage took and where an error came from.
     only_news : bool
         Without what an earlier run had finished.
+    is_plan : bool
+        Lines of what would be done: the flight first, and no state.
     """
 
     def __init__(
-        self, *, longest: int | None = None, is_shown: bool = True, everything: bool = False, only_news: bool = False
+        self,
+        *,
+        longest: int | None = None,
+        is_shown: bool = True,
+        everything: bool = False,
+        only_news: bool = False,
+        is_plan: bool = False,
     ) -> None:
-        self._longest = None if everything else longest
+        self._longest, self._is_plan = None if everything else longest, is_plan
         self._is_shown, self._everything, self._only_news = is_shown, everything, only_news
         self._told: dict[_Key, str] = {}
         self._names: dict[str, str] = {}
@@ -60,7 +68,8 @@ class Lines:
                 self._show(outcome, outcome.text.removeprefix(f"{before}; ") if outcome.text != before else "")
                 continue
             if outcome.state not in ("failed", "skipped"):
-                self._show(outcome, line_of(outcome, self._longest))
+                plan = "  ".join(filter(None, (outcome.flight_id, outcome.text)))
+                self._show(outcome, plan if self._is_plan else line_of(outcome, self._longest))
             if self._everything and outcome.times_s:
                 say("  " + ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in outcome.times_s.items()))
             tell_errors(outcome, with_traces=self._everything)

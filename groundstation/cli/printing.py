@@ -85,7 +85,7 @@ def outcomes(
     if as_json_text:
         tell(as_json([_plain(outcome) for outcome in done]))
         return
-    (lines or Lines(is_shown=not quiet, everything=with_times)).tell(tuple(done))
+    (lines or Lines(is_shown=not quiet, everything=with_times, is_plan=is_plan)).tell(tuple(done))
     if quiet:
         return
     for line in skipped_lines(done, most=len(done) if with_times else MOST_SKIPPED):

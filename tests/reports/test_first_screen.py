@@ -30,9 +30,14 @@ OPENS = {
     "gnss/inertialsense_Serial38400.nmea": ("good", "Good", "Single (3D) throughout", "19:23 min of GNSS"),
     "gnss/ublox_ins_drive_pvat.ubx": ("good", "Good", "GNSS with INS throughout", "8:46 min of GNSS"),
     "gnss/pygpsdata_testobsdata.log": ("plain", "Recorded", "Messages without navigation", ""),
-    "g1000/log_210623_141501_TEST1.csv": ("warn", "Not stabilised", "Landing, course 56.5", "1:18:02 h of GNSS"),
+    "g1000/log_210623_141501_TEST1.csv": ("warn", "Not stabilised", "Landing, runway EGTF 06", "1:18:02 h of GNSS"),
     "approach/coreg.hdf5": ("plain", "Recorded", "1:59:27 h of heading", ""),
-    "approach/flight_with_go_around_and_landing.hdf5": ("warn", "Not stabilised", "Landing, course 301.0", "3:43:59 h"),
+    "approach/flight_with_go_around_and_landing.hdf5": (
+        "warn",
+        "Not stabilised",
+        "Landing, runway OMDB 30L",
+        "3:43:59 h",
+    ),
     "foreign/robot_localization_husky_test1.bag": ("good", "Good", "DGNSS throughout", "6:35 min of GNSS"),
     "inertial/gv_ff02.csv": ("good", "Measured", "5773", "5:04:34 h of GNSS and INS at 1 Hz"),
 }

@@ -28,7 +28,6 @@ class MagneticFluxSettings:
     # Length of the window whose slope of speed is the acceleration; chosen.
     acceleration_window_s: float = number(20.0, 1.0, 120.0)
     settle_s: float = number(30.0, 0.0, 1200.0)  # so much is left out after a turn; chosen
-    settle_max_s: float = number(180.0, 0.0, 3600.0)  # without effect: nothing reads it
     leg_min_s: float = number(20.0, 1.0, 3600.0)  # shortest straight leg that is used; chosen
     leg_max_s: float = number(120.0, 10.0, 3600.0)  # longer legs are cut into parts; chosen
     leg_change_max_deg: float = number(10.0, 0.1, 90.0)  # largest range of heading along a straight leg; chosen

@@ -171,7 +171,7 @@ def test_logs_of_two_days_are_refused_in_a_line(logs: Path, tmp_path: Path) -> N
 
 def test_run_together_gives_one_flight_that_says_how(logs: Path, tmp_path: Path) -> None:
     paths = [str(logs / name) for name in ("a.ulg", "b.ubx")]
-    code, out, _err = groundstation("run", *paths, "--together", "-o", str(tmp_path / "out"), "--no-pdf")
+    code, out, _err = groundstation("run", *paths, "--together", "-o", str(tmp_path / "out"), "--no-pdf", "-v")
     assert code == 0
     assert "2 logs on one clock" in out
     (folder,) = (path for path in (tmp_path / "out").iterdir() if (path / "summary.json").exists())

@@ -44,7 +44,7 @@ def honest_factor(scale: float) -> float:
     Examples
     --------
     >>> round(honest_factor(2.385), 3), honest_factor(0.0)
-    (1.064, 1.0)
+    (1.083, 1.0)
     """
     if scale <= 0.0:
         return 1.0

@@ -167,7 +167,7 @@ def units_cases(runs: int, seed: int) -> tuple[UnitsCase, ...]:
     --------
     >>> cases = units_cases(200, 81)
     >>> [(case.name, case.flights) for case in cases[:2]], len(cases)
-    ([('healthy-60810', 200), ('fault-drift-2-60810', 24)], 32)
+    ([('healthy-60810', 200), ('fault-drift-2-60810', 24)], 36)
     """
     first = FIRST_SEED + SEEDS_PER_STUDY * seed
 
