@@ -254,7 +254,7 @@ def test_skipped_bytes_lie_between_the_records_around_them() -> None:
         assert (span.cause, span.start_s, span.length_s, span.is_exact) == ("corrupt", *expected, False)
 
 
-@pytest.mark.parametrize("write", [as_ulog, as_dataflash])
+@pytest.mark.parametrize("write", [pytest.param(as_ulog, marks=pytest.mark.slow), as_dataflash])
 def test_bytes_wiped_in_the_taxi_are_found_in_time_and_lean(tmp_path: Path, write: Callable[[Path], None]) -> None:
     """The span holds the times of all records that were lost and hardly more, and the answer says that it leans."""
     path = tmp_path / "log"

@@ -428,7 +428,7 @@ def bad_tables() -> Iterator[bytes]:
     yield (
         ",".join(f"c{at}" for at in range(10_000)) + "\n" + "\n".join(",".join(["1.5"] * 10_000) for _ in range(3))
     ).encode()
-    for number in range(60):
+    for number in range(24):
         content = bytearray(whole[: rng.randrange(1, len(whole))] if number % 3 == 0 else whole)
         for _ in range(rng.randrange(1, 20)):
             content[rng.randrange(len(content))] ^= 1 << rng.randrange(8)
@@ -456,7 +456,7 @@ def test_bad_tables_are_one_line(tmp_path: Path, write: Write) -> None:
                 told()
             except GroundstationError as error:
                 assert "\n" not in str(error)
-    assert drafts > 30
+    assert drafts > 15
 
 
 def test_a_shipped_profile_is_checked_by_its_name(tmp_path: Path) -> None:
