@@ -77,7 +77,7 @@ def _misplaced(answer: CooperativeResult) -> tuple[Finding, ...]:
     """
     found = []
     stations = answer.stations
-    told = {row.station for row in stations.rows if row.verdict != "fits"} if stations else set()
+    told = {row.station for row in stations.in_doubt} if stations else set()
     for name in (name for name in answer.point_names if name not in told):
         mine = [link for link in answer.links if link.kind == "point" and link.source == name]
         rest = [link for link in answer.links if link not in mine]
@@ -103,7 +103,7 @@ def _sentence(answers: Answers) -> str:
     who = f"{len(answer.vehicle_names)} aircraft" if len(answer.vehicle_names) > 1 else answer.vehicle_names[0]
     doubt = ", sigma too small: the ranges contradict it" if _too_sure(answer) else ""
     if answer.stations is not None:
-        doubted = [row.station for row in answer.stations.rows if row.verdict != "fits"]
+        doubted = [row.station for row in answer.stations.in_doubt]
         doubt += f"; station{'s' if len(doubted) > 1 else ''} in doubt: {', '.join(doubted)}" if doubted else ""
     sigma = f"2 sigma_r {rows[0].two_sigma_r_session_m:.1f} m over the session"
     return f"{who}, {answer.default_algorithm}: {sigma}{against}{doubt}"

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-StationVerdict = Literal["fits", "off", "one of several", "left out"]
+StationVerdict = Literal["fits", "off", "one of several", "left out", "not judged"]
 
 
 def digits_of(metres: float | None) -> int:
@@ -25,9 +25,10 @@ class StationRow:
     Parameters
     ----------
     station : str
-    verdict : {'fits', 'off', 'one of several', 'left out'}
+    verdict : {'fits', 'off', 'one of several', 'left out', 'not judged'}
         ``one of several``: it or another of those with this verdict is off. ``left out``: its ranges are too long or
-        too short by a delay (its clock), and are not used.
+        too short by a delay (its clock), and are not used; alone with one of several: that, or the other is off.
+        ``not judged``: no ranges, or none that would show an error.
     ranges : int
     chance : float
         Chance of residuals as bad as these when the station is right, times the number of questions asked, at most 1.
@@ -125,6 +126,11 @@ class StationsAnswer:
     datums: tuple[DatumRow, ...]
     raised: dict[str, float]
     repetition: float
+
+    @property
+    def in_doubt(self) -> tuple[StationRow, ...]:
+        """Stations that are off, or may be."""
+        return tuple(row for row in self.rows if row.verdict not in ("fits", "not judged"))
 
     def with_verdict(self, verdict: StationVerdict) -> tuple[StationRow, ...]:
         """Return the stations of one verdict."""

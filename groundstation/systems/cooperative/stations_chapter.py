@@ -38,7 +38,13 @@ DATUM_CAPTION = (
     "session would show it."
 )
 NUMBERS = ("cooperative_stations",)
-TONES: dict[str, Tone] = {"fits": "good", "off": "bad", "one of several": "warn", "left out": "bad"}
+TONES: dict[str, Tone] = {
+    "fits": "good",
+    "off": "bad",
+    "one of several": "warn",
+    "left out": "bad",
+    "not judged": "unknown",
+}
 
 
 def stations_warning(answer: CooperativeResult) -> str:
@@ -56,14 +62,20 @@ def stations_warning(answer: CooperativeResult) -> str:
             f"Station {row.station} is {_size(row)} off its place in the stations file; the answer takes its place as "
             f"unknown by {number(row.used_sigma_m, digits_of(row.used_sigma_m), 'm')}."
         )
-    several = stations.with_verdict("one of several")
-    if several:
+    several, late = stations.with_verdict("one of several"), stations.with_verdict("left out")
+    if len(several) == 1 and late:
+        said.append(
+            f"Station {several[0].station} is {_size(several[0])} off its place in the stations file, or ranges of "
+            f"station {', '.join(row.station for row in late)} are off by a delay: the session does not tell which, "
+            "and the answer relies on none of them."
+        )
+    elif several:
         names = ", ".join(row.station for row in several)
         said.append(
             f"Stations {names} contradict each other by {_size(several[0])}: the session does not tell which is off, "
             "and the answer relies on the place of none of them."
         )
-    for row in stations.with_verdict("left out"):
+    for row in late:
         said.append(
             f"Ranges of station {row.station} are off by "
             f"{number(row.delay_m, digits_of(row.delay_m), 'm', signed=True)} (clock or delay); "
@@ -92,7 +104,7 @@ def _stations(stations: StationsAnswer) -> Grid:
             row.station,
             Mark(TONES[row.verdict], row.verdict),
             number(row.ranges, 0),
-            "below 0.0001" if row.chance < 1e-4 else number(row.chance, 4),
+            _chance(row),
             _with_sigma(row.shift_m, row.shift_sigma_m),
             number(row.shift_direction_deg, 0),
             _with_sigma(row.delay_m, row.delay_sigma_m, signed=True),
@@ -102,6 +114,12 @@ def _stations(stations: StationsAnswer) -> Grid:
         for row in stations.rows
     ]
     return Grid("Ground stations", STATION_HEADS, rows, STATION_CAPTION + _tested_with(stations), NUMBERS)
+
+
+def _chance(row: StationRow) -> str:
+    if row.verdict == "not judged":
+        return ""
+    return "below 0.0001" if row.chance < 1e-4 else number(row.chance, 4)
 
 
 def _tested_with(stations: StationsAnswer) -> str:

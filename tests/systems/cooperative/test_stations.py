@@ -9,12 +9,15 @@ from groundstation.base.datums import DATUMS
 from groundstation.base.errors import SettingsError
 from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_scenario import load_session
+from groundstation.systems.cooperative.answer import CooperativeResult
 from groundstation.systems.cooperative.estimate import estimate_session
 from groundstation.systems.cooperative.events import prepare
 from groundstation.systems.cooperative.smoother.smoothed import run_smoothed
 from groundstation.systems.cooperative.stations.hypotheses import FOUND, chance_of, noncentrality
 from groundstation.systems.cooperative.stations.information import EACH, station_information
 from groundstation.systems.cooperative.stations.judge import StationJudgement, judge_stations, survey_of
+from groundstation.systems.cooperative.stations.rows import station_findings, stations_answer
+from groundstation.systems.cooperative.stations_chapter import stations_parts, stations_warning
 from groundstation.systems.cooperative.study.station_cases import CASES, KNOWN_CLOCKS, StationCase
 from groundstation.systems.cooperative.study.station_runs import drawn
 from groundstation.systems.cooperative.study.stations import study_stations
@@ -152,6 +155,30 @@ def test_the_delay_of_a_station_left_out_is_inside_its_interval() -> None:
     (delay,) = doubt.tests
     assert doubt.station == 1 and delay.size_sigma_m < 5.0
     assert delay.error_m[0] == pytest.approx(150.0, abs=2.0 * delay.size_sigma_m)
+
+
+def test_a_shift_of_one_station_or_a_delay_of_another_is_told_as_either() -> None:
+    case = replace(BY_NAME["delay-300"], delay_m=60.0, believed=KNOWN_CLOCKS)
+    _, session, _ = drawn(case, 90_000, 0)
+    answer = stations_answer(judge_stations(session, case.settings()), session, session.names)
+    assert [row.verdict for row in answer.rows] == ["one of several", "left out"]
+    either, late = (finding.text for finding in station_findings(answer))
+    assert "or ranges of station N2 are off by a delay: the session does not tell which" in either
+    assert late.startswith("ranges of station N2 are off by")
+    result = CooperativeResult("local", "smoothed", (), (), stations=answer)
+    assert "contradict" not in either + stations_warning(result) and "Station N1 is " in stations_warning(result)
+
+
+def test_a_station_that_nobody_hears_does_not_fit() -> None:
+    case = BY_NAME["two-right"]
+    _, session, _ = drawn(case, SEED, 0)
+    unheard = replace(session.points[0], name="N9", position_m=(1e4, 2e4, 0.0))
+    session = replace(session, points=(*session.points, unheard))
+    answer = stations_answer(judge_stations(session, case.settings()), session, session.names)
+    assert [row.verdict for row in answer.rows] == ["fits", "fits", "not judged"]
+    assert answer.in_doubt == () and station_findings(answer) == ()
+    (table, *_) = stations_parts(CooperativeResult("local", "smoothed", (), (), stations=answer))
+    assert table is not None and table.rows[2][3] == ""
 
 
 def test_ins_worse_than_believed_is_taken_as_it_is_and_accuses_no_station() -> None:

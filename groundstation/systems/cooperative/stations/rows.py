@@ -69,8 +69,15 @@ def station_findings(answer: StationsAnswer) -> tuple[Finding, ...]:
     for row in answer.with_verdict("off"):
         text = f"station {row.station} is not where the stations file has it: {shift_text(row)}; {_unknown((row,))}"
         found.append(_finding(row, text))
-    several = answer.with_verdict("one of several")
-    if several:
+    several, late = answer.with_verdict("one of several"), answer.with_verdict("left out")
+    if len(several) == 1 and late:
+        (row,) = several
+        text = (
+            f"station {row.station} is not where the stations file has it ({shift_text(row)}), or ranges of station "
+            f"{_names(late)} are off by a delay: the session does not tell which; {_unknown(several)}"
+        )
+        found.append(_finding(row, text))
+    elif several:
         each = "; ".join(f"{row.station} alone: {shift_text(row)}" for row in several)
         names = _names(several)
         text = (
@@ -78,7 +85,7 @@ def station_findings(answer: StationsAnswer) -> tuple[Finding, ...]:
             f"stations file has it ({each}); {_unknown(several)}"
         )
         found += [_finding(row, text) for row in several[:1]]
-    for row in answer.with_verdict("left out"):
+    for row in late:
         low, high = _interval(row.delay_m or 0.0, row.delay_sigma_m or 0.0)
         n = digits_of(row.delay_m)
         text = (
@@ -154,7 +161,7 @@ def _row(judgement: StationJudgement, session: Session, station: int, vehicles: 
 def _verdict(judgement: StationJudgement, station: int) -> StationVerdict:
     doubt = next((one for one in judgement.doubts if one.station == station), None)
     if doubt is None:
-        return "fits"
+        return "fits" if any(test.station == station for test in judgement.tests) else "not judged"
     if doubt.left_out:
         return "left out"
     return "off" if station in judgement.named() else "one of several"
