@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 from groundstation.base.errors import UnreadableLogError, UsageError
 from groundstation.base.quantiles import NORMAL_95
+from groundstation.chapters.comparison import conclusion, plain_name
 from groundstation.chapters.plots.comparison import sides_of
 from groundstation.cli.main import app
 from groundstation.pipeline.many_flights.inputs import collect
@@ -32,8 +33,10 @@ from groundstation.results.manifest import Manifest
 from groundstation.results.summary import summary_of
 from groundstation.simulation.samples import write_scenario
 from groundstation.systems import systems
+from groundstation.systems.health.answer import AutopilotHealth
 from groundstation.systems.inertial.answer import InertialResult, RealOutage
 from groundstation.systems.inertial.arrays import InertialStates
+from groundstation.systems.landing.answer import LandingResult
 from groundstation.viewer.comparison import OVER_TIME
 from tests.recording_contents import Contents
 from tests.saved import load
@@ -257,6 +260,48 @@ def test_an_outage_is_the_first_interval_without_gnss() -> None:
     assert events_of(saved_with(figures))["outage"] == 95.0
     other = saved_with(figures, inertial)
     assert align(other, saved_with(figures), "outage", is_same_log=False).offset_s == -5.0
+
+
+def test_two_flights_are_not_compared_by_their_stands_and_come_to_a_conclusion(folders: dict[str, Path]) -> None:
+    one, two = compared(folders["good"], folders["faster"]), compared(folders["good"], folders["later"])
+    assert "heading.parking_heading_deg" in by_name(one)
+    assert not [name for name in by_name(two) if "parking" in name and name.endswith("heading_deg")]
+    text = conclusion(two).text
+    judged = [delta for delta in two.shown if delta.is_significant is not None]
+    assert judged and f"{len(judged)} answers with a σ" in text
+    for delta in two.shown:
+        assert (plain_name(delta) in text) >= bool(delta.is_significant and sum(map(_beyond, two.shown)) <= 4)
+    code, out, _ = groundstation("compare", str(folders["good"]), str(folders["later"]))
+    assert code == 0 and "Conclusion: " in out
+    same = compared(folders["good"], folders["good"])
+    assert conclusion(same).text == "Conclusion: Both gave the same answers."
+
+
+def _beyond(delta: Delta) -> bool:
+    return bool(delta.is_significant)
+
+
+def test_names_are_plain_and_landing_and_health_are_compared(tmp_path: Path) -> None:
+    told = make_results(make_flight(240.0, 20.0)).answers
+    for name, verdict in (("a", "pass"), ("b", "fail")):
+        health = AutopilotHealth(verdict, "", "PX4", "flight", "", 100.0, ())  # type: ignore[arg-type]
+        saved_example(tmp_path / name, answers={**told, "health": health, "landing": LandingResult(())})
+    a, b = (load(tmp_path / name) for name in "ab")
+    comparison = compared(tmp_path / "a", tmp_path / "b")
+    titles = [plain_name(delta) for delta in comparison.shown]
+    assert "Heading: error, °" in titles and not [title for title in titles if "_" in title.partition(" (")[0]]
+    assert "Approaches: approaches found" in titles
+    text = "Autopilot health: worst of the checks: pass in A, fail in B."
+    assert conclusion(comparison).text.endswith(text) and conclusion(comparison).tone == "warn"
+    assert "heading.error_deg" not in re.sub("<svg.*?</svg>", "", comparison_html(comparison, a, b), flags=re.DOTALL)
+
+
+def test_a_reference_that_judges_nothing_judges_nothing() -> None:
+    errors = [{"quantity": "position", "rms_m": 2.0}]
+    judge, none = (summary(reference={"is_judge": one, "errors": errors}) for one in (True, False))
+    assert "reference.errors.position.rms_m" in {delta.name for delta in deltas_of(judge, judge)}
+    for sides in ((none, none), (judge, none), (none, judge)):
+        assert not [delta.name for delta in deltas_of(*sides) if delta.name.startswith("reference.")]
 
 
 # ---------------------------------------------------------------------------------------------------- files

@@ -8,13 +8,64 @@ from collections.abc import Sequence
 from groundstation.base.findings import Finding
 from groundstation.chapters.findings import MARKS
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Part, Section
-from groundstation.chapters.wording import ABSENT, any_value, number, significant
+from groundstation.chapters.wording import ABSENT, any_value, named_quantity, number, significant, words
 from groundstation.results.comparison import Comparison, Delta, Value
 
 SHARED = (
     "Both come from {}: they share its noise, and all differences come from {} alone. A difference within the stated "
     "sigmas does not prove that these do not matter."
 )
+
+
+MOST_TOLD = 4  # differences in the sentence
+
+
+def conclusion(comparison: Comparison) -> Note:
+    """Return what the comparison comes to, in a sentence or two."""
+    shown = comparison.shown
+    beyond = [one for one in shown if one.is_significant]
+    judged = sum(one.is_significant is not None for one in shown)
+    texts = [one for one in shown if one.delta is None and one.is_different and one.is_main]
+    told = []
+    if beyond:
+        few = "; ".join(_change(one) for one in beyond[:MOST_TOLD])
+        more = f"; and {len(beyond) - MOST_TOLD} more" if len(beyond) > MOST_TOLD else ""
+        told.append(f"{len(beyond)} of {judged} answers with a σ differ beyond it: {few}{more}.")
+    elif judged:
+        told.append(f"None of the {judged} answers with a σ differs beyond it.")
+    if texts:
+        told.append(
+            "; ".join(f"{plain_name(one)}: {_value(one.a)} in A, {_value(one.b)} in B" for one in texts[:4]) + "."
+        )
+    if not any(one.is_different for one in comparison.deltas):
+        told = ["Both gave the same answers." if comparison.deltas else "They have no answer in common."]
+    if not told:
+        told = ["No answer in common has a σ: whether the differences matter is not known."]
+    return Note("Conclusion: " + " ".join(told), "warn" if beyond or texts else "plain")
+
+
+def _change(delta: Delta) -> str:
+    return f"{plain_name(delta)} {significant(delta.delta, 3)} (σ {significant(delta.sigma, 2)})"
+
+
+def plain_name(delta: Delta) -> str:
+    """Return the name of an answer in words, with its unit.
+
+    Examples
+    --------
+    >>> plain_name(Delta("heading.confidence95_low_deg", 1.0, 2.0)), plain_name(Delta("status", "ok", "ok"))
+    ('Heading: confidence95 low, °', 'Status')
+    >>> plain_name(Delta("forecast.skill.windows.5min.rms_m", 1.0, 2.0))
+    'Forecast: rms, m (skill, windows, 5min)'
+    """
+    if delta.title:
+        return delta.title
+    first, *middle = delta.name.split(".")
+    if not middle:
+        return words(first).capitalize()
+    what, unit = named_quantity(middle[-1])
+    inside = f" ({', '.join(words(part) for part in middle[:-1])})" if len(middle) > 1 else ""
+    return f"{words(first).capitalize()}: {what}{f', {unit}' if unit else ''}{inside}"
 
 
 def opening(comparison: Comparison) -> list[Part]:
@@ -31,7 +82,12 @@ def opening(comparison: Comparison) -> list[Part]:
     told = f"Clocks aligned on {alignment.event}{when}: clock of B {number(alignment.offset_s, 3, 's', signed=True)}."
     heads = (Head(""), Head(f"A: {comparison.a.flight_id}"), Head(f"B: {comparison.b.flight_id}"))
     shared = [Note(SHARED.format(comparison.origin, comparison.cause), "warn")] if comparison.is_same_log else []
-    return [Grid("", heads, rows), Note(f"{told} Times in the figures are flight times of A."), *shared]
+    return [
+        conclusion(comparison),
+        Grid("", heads, rows),
+        Note(f"{told} Times in the figures are flight times of A."),
+        *shared,
+    ]
 
 
 def answers(comparison: Comparison) -> Section:
@@ -51,7 +107,7 @@ def answers(comparison: Comparison) -> Section:
         "common answers differ at all (see compare.csv). σ of the difference: from the sigmas of both, taken as "
         "independent; empty where one states none."
     )
-    lead = "Answers that both flights have; names as in summary.json."
+    lead = "Answers that both flights have; compare.csv has their names in summary.json."
     return Section("answers", "Answers", lead, (Grid("", heads, rows, caption),))
 
 
@@ -59,7 +115,7 @@ def _row(delta: Delta) -> tuple[Cell, ...]:
     change = "" if delta.delta is None else significant(delta.delta, 6)
     sigma = "" if delta.sigma is None else significant(delta.sigma, 3)
     marks: dict[bool | None, Cell] = {None: "", True: Mark("warn", "beyond"), False: "within"}
-    return (delta.name, _value(delta.a), _value(delta.b), change, sigma, marks[delta.is_significant])
+    return (plain_name(delta), _value(delta.a), _value(delta.b), change, sigma, marks[delta.is_significant])
 
 
 def _value(value: Value) -> str:

@@ -210,6 +210,7 @@ def comparison_text(found: "Comparison", *, everything: bool = False) -> str:
     The alignment of the clocks; answers, settings and findings that differ.
     """
     from groundstation.base.text_columns import columns
+    from groundstation.chapters.comparison import conclusion
 
     alignment = found.alignment
     when = "" if alignment.event == "utc" else f" (A at {alignment.a_s:.1f} s, B at {alignment.b_s:.1f} s)"
@@ -225,7 +226,7 @@ def comparison_text(found: "Comparison", *, everything: bool = False) -> str:
         rows.append(
             [printable(delta.name), _text(delta.a), _text(delta.b), change, sigma, SIGNIFICANCE[delta.is_significant]]
         )
-    parts = [f"{columns(sides)}\n{aligned}", columns(rows, right=(1, 2, 3, 4))]
+    parts = [f"{columns(sides)}\n{aligned}", printable(conclusion(found).text), columns(rows, right=(1, 2, 3, 4))]
     if found.settings:
         pairs = [[printable(pair.name), _text(pair.a), _text(pair.b)] for pair in found.settings]
         parts.append(columns([["setting", "A", "B"], *pairs]))

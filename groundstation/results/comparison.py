@@ -63,6 +63,8 @@ class Delta:
         Sigma of the difference, from the sigmas both state, taken as independent; None where one states none.
     is_main : bool
         True where it stands in the short table.
+    title : str
+        What it is in words, where its name is that of a column.
     """
 
     name: str
@@ -71,6 +73,7 @@ class Delta:
     delta: float | None = None
     sigma: float | None = None
     is_main: bool = False
+    title: str = ""
 
     @property
     def is_significant(self) -> bool | None:

@@ -171,6 +171,8 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     is_main : callable
         ``is_main(path, saved)``: whether the number at that path of its answer, ``azimuth.error_deg``, is one of those
         that ``compare`` tells first; ``saved`` are the answers of both flights, as in summary.json.
+    compared : tuple of str
+        Names of its columns that ``compare`` tells first too, with what they mean.
     judges : bool
         Whether it is given the truth, by which it judges the others: it runs where there is one, and last; every other
         analysis is given a flight without it.
@@ -200,6 +202,7 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     offers: Mapping[type[Any], Callable[[KnownT], Any]] = field(default_factory=dict)
     page_title: str = ""
     is_main: Callable[[str, "tuple[Mapping[str, Any], ...]"], bool] = _none_is_main
+    compared: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         known = {field.name for field in dataclasses.fields(cast(Any, self.answer))}

@@ -36,6 +36,7 @@ STATED_SIGMA = {  # where it is not named as the number with "sigma" before the 
     "value": ("sigma",),
 }
 NO_ANSWER = ("settings", "title", "unit", "limit", "reason", "figures")
+OF_A_STAND = ("parking_heading_deg", "parking_ins_heading_deg", "reference_parking_heading_deg")
 LONGEST_TEXT = 60
 MAIN = ("status", "flight.duration_s")  # of every flight; those of an answer: Analysis.is_main
 
@@ -70,7 +71,10 @@ def compare(a: Path, b: Path, event: Event | None = None) -> tuple[Comparison, S
         other,
         is_same_log,
         align(saved_a, saved_b, event, is_same_log=is_same_log),
-        deltas_of(saved_a.summary, saved_b.summary),
+        (
+            *deltas_of(saved_a.summary, saved_b.summary, is_same_log=is_same_log),
+            *_columns(saved_a, saved_b),
+        ),
         _settings(saved_a, saved_b),
         _only(findings[0], findings[1]),
         _only(findings[1], findings[0]),
@@ -138,10 +142,10 @@ def _origin(saved: SavedFlight) -> str:
 # ---------------------------------------------------------------------------------------------------- answers
 
 
-def deltas_of(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[Delta, ...]:
+def deltas_of(a: Mapping[str, Any], b: Mapping[str, Any], *, is_same_log: bool = True) -> tuple[Delta, ...]:
     """Return the differences of every answer that two summaries have in common.
 
-    Texts of lesser weight only where they differ.
+    Texts of lesser weight only where they differ. Headings of a stand only of one log: two flights park anywhere.
 
     Examples
     --------
@@ -150,11 +154,14 @@ def deltas_of(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[Delta, ...]:
     >>> delta.name, round(delta.delta, 6), round(delta.sigma, 6), delta.is_significant
     ('heading.error_deg', 0.2, 0.042426, True)
     """
+    a, b = _judged(a), _judged(b)
     answers_a, answers_b = _answers(a), _answers(b)
     is_main_of = _main_numbers(a, b)
     deltas = []
     for name, (value_a, sigma_a) in answers_a.items():
         value_b, sigma_b = answers_b.get(name, (None, None))
+        if not is_same_log and name.rpartition(".")[2] in OF_A_STAND:
+            continue
         is_main = is_main_of(name)
         if name not in answers_b or value_a is value_b is None:
             continue
@@ -164,6 +171,36 @@ def deltas_of(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[Delta, ...]:
         sigma = None if delta is None or sigma_a is None or sigma_b is None else round(math.hypot(sigma_a, sigma_b), 9)
         deltas.append(Delta(name, value_a, value_b, delta, sigma, is_main))
     return tuple(deltas)
+
+
+def _judged(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a summary without the answers of a reference that judges nothing."""
+    results = mapping(summary, "results")
+    kept = {name: one for name, one in results.items() if mapping(results, name).get("is_judge") is not False}
+    return {**summary, "results": kept}
+
+
+def _columns(a: SavedFlight, b: SavedFlight) -> tuple[Delta, ...]:
+    """Return the differences of the columns that analyses name for it, where either flight has a value."""
+    found = []
+    for analysis in systems().analyses:
+        sides = (analysis.values(a.results.answers), analysis.values(b.results.answers))
+        for column in analysis.columns:
+            if column.name not in analysis.compared or not all(column.name in side for side in sides):
+                continue
+            one, other = (_plain(side[column.name]) for side in sides)
+            if one is None and other is None:
+                continue
+            name = f"{analysis.name}.{column.name}"
+            title = f"{analysis.page_title or analysis.name}: {column.meaning.partition(":")[0]}"
+            found.append(Delta(name, one, other, _difference(name, one, other), None, True, title))
+    return tuple(found)
+
+
+def _plain(value: Any) -> Value:
+    if value is None or value == "" or (isinstance(value, float) and not math.isfinite(value)):
+        return None
+    return value if isinstance(value, str | bool) else float(value)
 
 
 def _difference(name: str, a: Value, b: Value) -> float | None:

@@ -196,5 +196,6 @@ HEALTH = Analysis(
     applies=_applies,
     sentence=_sentence,
     columns=COLUMNS,
+    compared=("health_verdict", "health_vibration_mps2", "health_hdop", "health_test_ratio"),
     examine=_examine,
 )

@@ -393,4 +393,9 @@ LANDING = Analysis(
     rules=Rules(LIMITS, rejudge),
     examine=_examine,
     is_main=main_numbers("verdict"),
+    compared=(
+        *("landing_approaches", "landing_go_arounds", "landing_runway", "landing_stabilised"),
+        *("landing_unstable_approaches", "landing_touchdown_m", "landing_sink_rate_mps", "landing_lateral_rms_dots"),
+        "landing_vertical_rms_dots",
+    ),
 )
