@@ -50,6 +50,9 @@ SCENARIOS = Path(__file__).parents[1] / "groundstation" / "simulation" / "scenar
 GRID_S = 0.2  # step of the grid on which phases are told apart
 LATER_S = 23.7
 LEAST_PIXELS = 40
+OVER_EACH_OTHER = {
+    name: tell for name, tell in COMPARED.items() if not name.endswith("-difference")
+}  # not on the page alone
 SPEEDS = [f"/comparison/overview-ground_speed_mps/ground_speed/b0{place}_lines" for place in range(2)]  # of A, of B
 
 
@@ -296,6 +299,18 @@ def test_names_are_plain_and_landing_and_health_are_compared(tmp_path: Path) -> 
     assert "heading.error_deg" not in re.sub("<svg.*?</svg>", "", comparison_html(comparison, a, b), flags=re.DOTALL)
 
 
+def test_differences_are_drawn_at_the_same_time(folders: dict[str, Path]) -> None:
+    whole, part = load(folders["good"]), load(folders["part"])
+    sides = sides_of(compared(folders["good"], folders["part"]), whole, part)
+    plot = COMPARED["overview-heading_deg-difference"](sides)
+    assert plot is not None and plot.title == "INS heading, B − A"
+    curve = plot.rows[0].panels[0].marks[-1]
+    known = np.isfinite(curve.y)
+    assert known.sum() > 100 and np.abs(curve.y[known]).max() < 0.5 and curve.x[known].min() >= 30.0
+    lone = sides_of(compared(folders["good"], folders["good"]), whole, whole)
+    assert not np.nan_to_num(COMPARED["overview-altitude_m-difference"](lone).rows[0].panels[0].marks[-1].y).any()
+
+
 def test_a_reference_that_judges_nothing_judges_nothing() -> None:
     errors = [{"quantity": "position", "rms_m": 2.0}]
     judge, none = (summary(reference={"is_judge": one, "errors": errors}) for one in (True, False))
@@ -346,7 +361,7 @@ def test_every_figure_of_every_analysis_is_laid_over(tmp_path: Path) -> None:
     ]
     assert set(both) <= set(contents.batches)
     drawn = {entity.split("/")[2] for entity in {*contents.batches, *contents.fixed} if entity.count("/") > 2}
-    assert drawn >= {name for name, tell in COMPARED.items() if tell(sides_of(comparison, a, b)) is not None}
+    assert drawn >= {name for name, tell in OVER_EACH_OTHER.items() if tell(sides_of(comparison, a, b)) is not None}
     assert len(drawn) > 10
     html = comparison_html(comparison, a, b)
     for title in ("Tracks", "Altitude", "Heading error, running mean", "North position error", "Forecast"):
@@ -355,7 +370,7 @@ def test_every_figure_of_every_analysis_is_laid_over(tmp_path: Path) -> None:
 
 def test_every_figure_of_the_page_has_its_place_in_the_recording() -> None:
     rows = (*OVER_TIME, *(row for one in systems().compared for row in one.rows))
-    assert {"tracks", *(name for row in rows for name in row)} == set(COMPARED)
+    assert {"tracks", *(name for row in rows for name in row)} == set(OVER_EACH_OTHER)
 
 
 def test_each_line_of_the_recording_has_its_band_and_its_values(tmp_path: Path) -> None:

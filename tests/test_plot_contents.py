@@ -22,6 +22,8 @@ NOT_KEPT = {
     *("fleet.deviation", "fleet.installation", "fleet.units", "gnss.pair"),
     *("health.lanes", "health.panels"),  # no case has an autopilot: tests/systems/health/test_pages.py
     *("overview-pressure_altitude_m", "session_errors-two_sigma_r_m", "session_errors-rms_error_m"),
+    *("overview-pressure_altitude_m-difference", "session_errors-two_sigma_r_m-difference"),
+    "session_errors-rms_error_m-difference",
 }
 
 

@@ -103,7 +103,7 @@ def verdict_mark(verdict: str) -> Mark:
 
 
 class Column(NamedTuple):
-    """Column of the table: its head, its cell of a flight, and the column of the fleet that must not be empty."""
+    """Column of the table: head, cell of a flight, column of the fleet that must have values."""
 
     head: Head
     cell: Callable[[dict[str, Any]], Cell]

@@ -101,7 +101,7 @@ def _attention(fleet: FleetResults) -> tuple[Mark, str]:
 
 
 def _flights(fleet: FleetResults) -> list[str]:
-    """Return the names of the flights that were rejected, flew unstable approaches or lost data."""
+    """Return the names of flights rejected, with unstable approaches or lost data."""
     flights = fleet.flights
     kinds = (
         ("Rejected", flights["verdict"] == "reject"),

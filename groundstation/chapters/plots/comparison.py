@@ -7,10 +7,11 @@ from typing import Any, Generic, NamedTuple
 
 import numpy as np
 
+from groundstation.base.angles import wrap_180
 from groundstation.base.geodesy import north_east_m, on_earth, plan_north_east_m
 from groundstation.chapters.plots.common import M_PER_KM, has_values
 from groundstation.plots.axes import time_axis
-from groundstation.plots.marks import AnyMark, Band, Curve, Emphasis, Floats, Lanes, Role, Told
+from groundstation.plots.marks import AnyMark, Band, Curve, Emphasis, Floats, Lanes, Limit, Role, Told
 from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import broken_at_gaps, broken_at_wrap, finite, padded
 from groundstation.results.arrays.flight import Overview, PhaseSpans
@@ -20,6 +21,7 @@ from groundstation.results.files import SavedFlight
 
 NEAR_M = 200_000.0  # flights that begin no further apart share one map
 LANE_MM = 4.0
+GAP_STEPS = 10.0  # usual intervals over which no difference is told
 
 
 @dataclass(frozen=True)
@@ -184,6 +186,61 @@ def overlay(sides: Sequence[PlottedSide], told: Overlay[Any]) -> Plot | None:
     )
 
 
+def difference(sides: Sequence[PlottedSide], told: Overlay[Any]) -> Plot | None:
+    """Return B less A of a line, with its band.
+
+    None unless both have it at the same time.
+    """
+    drawn = [(side, line) for side in sides if (line := told.of(side.flight)) is not None]
+    if len(drawn) < 2:
+        return None
+    (a, one), (b, other) = drawn
+    time, theirs = one.time_s + a.offset_s, other.time_s + b.offset_s
+    is_angle = told.name.endswith("heading_deg")
+    change = _held(theirs, other.values, time, is_angle=is_angle) - one.values
+    change = wrap_180(change) if is_angle else change
+    if not has_values(change):
+        return None
+    marks: list[AnyMark] = [Limit(value=0.0, role="faint", dash="dotted", emphasis="faint")]
+    half = None
+    if one.half is not None and other.half is not None:
+        half = np.hypot(one.half, _held(theirs, other.half, time))
+    x, change, half = broken_at_gaps(time, change, np.full(len(time), np.nan) if half is None else half)
+    if np.isfinite(half).any():
+        marks.append(Band(x=x, low=change - half, high=change + half, role="answer", name="95 %, as if independent"))
+    marks.append(Curve(x=x, y=change, role="answer", name="B − A"))
+    known = np.isfinite(change)
+    ends = padded(*np.percentile(change[known], (0.5, 99.5)).tolist())
+    return Plot(
+        f"comparison.{told.name}-difference",
+        f"{told.title}, B − A",
+        f"{told.title}: B less A at the same time of A.",
+        f"{told.title}, B less A, over flight time.",
+        one_panel(
+            Panel(
+                tuple(marks),
+                time_axis(float(x[known].min()), float(x[known].max())),
+                Axis(f"B − A, {told.axis.rpartition(', ')[2]}", low=ends[0], high=ends[1]),
+            ),
+            30.0,
+        ),
+    )
+
+
+def _held(time: Floats, values: Floats | None, at: Floats, *, is_angle: bool = False) -> Floats:
+    """Interpolate values at times, NaN outside them and in their gaps."""
+    known = np.flatnonzero(np.isfinite(values)) if values is not None else np.zeros(0, np.intp)
+    if values is None or len(known) < 2:
+        return np.full(len(at), np.nan)
+    time, values = time[known], values[known]
+    values = np.unwrap(values, period=360.0) if is_angle else values
+    found = np.interp(at, time, values, left=np.nan, right=np.nan)
+    steps = np.diff(time)
+    after = np.clip(np.searchsorted(time, at), 1, len(time) - 1)
+    found[steps[after - 1] > GAP_STEPS * max(float(np.median(steps)), 1e-3)] = np.nan
+    return np.asarray(found)
+
+
 def phases(sides: Sequence[PlottedSide]) -> Plot | None:
     """Phases of both flights in lanes under each other, over the flight time of A."""
     drawn = [(side, rows) for side in sides if (rows := side.flight.rows_of(PhaseSpans)) is not None and len(rows)]
@@ -208,8 +265,12 @@ def phases(sides: Sequence[PlottedSide]) -> Plot | None:
 
 
 def overlaid(*overlays: Overlay[Any]) -> dict[str, Tell]:
-    """Return the figures of some curves, by name."""
-    return {one.name: partial(overlay, told=one) for one in overlays}
+    """Return the figures of some curves, by name, each with that of the difference behind it."""
+    found: dict[str, Tell] = {}
+    for one in overlays:
+        found[one.name] = partial(overlay, told=one)
+        found[f"{one.name}-difference"] = partial(difference, told=one)
+    return found
 
 
 COMPARED: dict[str, Tell] = {  # of all flights

@@ -1,4 +1,4 @@
-"""Trends of each aircraft over its flights: control charts, changes of level, slopes, date of a limit."""
+"""Trends of each aircraft: control charts, changes of level, slopes, date of a limit."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -121,7 +121,7 @@ def trends(flights: FigureData, settings: ChangeSettings, limits: UnitLimits | N
 
 
 def _limits(limits: UnitLimits) -> dict[TrendQuantity, float]:
-    """Limits of the charted quantities: those stated, and the one that the filter on board has itself."""
+    """Limits of the charted quantities: those stated, and that of the on-board filter."""
     stated: Mapping[TrendQuantity, float | None] = {
         "error_deg": limits.heading_error_deg,
         "radial_error_rate_fit_nmiph": limits.rate_nmiph,
@@ -133,7 +133,7 @@ def _limits(limits: UnitLimits) -> dict[TrendQuantity, float]:
 def _series(
     day: FloatArray, value: FloatArray, shown: FloatArray, settings: ChangeSettings
 ) -> tuple[UnitSeries, FloatArray]:
-    """Return changes and line of a series, and the curve that its levels lie about: zero where it has steps."""
+    """Return changes and line of a series, and the curve of its levels: zero for steps."""
     is_positive = shown is not value
     draws = int(np.clip(MOST_ORDERS // len(day), 99, 999))
     series = series_of(day, value, settings=SeriesSettings(settings, FALSE_STEPS, draws), is_positive=is_positive)
@@ -180,7 +180,7 @@ def _slope(
 
 
 def _crossing(day: FloatArray, value: FloatArray, line: Line, limit: float, *, is_positive: bool) -> Crossing:
-    """Return when a slope reaches a limit; a falling one reaches its negative, if it has a sign."""
+    """Return when a slope reaches a limit; a falling one reaches its negative."""
     if is_positive:
         return crossing_of(day, value, limit) if line.slope > 0.0 else Crossing(None, None, None)
     rising = line if line.slope > 0.0 else line_of(day, -value)

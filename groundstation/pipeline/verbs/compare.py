@@ -181,7 +181,7 @@ def _judged(summary: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _columns(a: SavedFlight, b: SavedFlight) -> tuple[Delta, ...]:
-    """Return the differences of the columns that analyses name for it, where either flight has a value."""
+    """Return the differences of the columns that analyses name for it."""
     found = []
     for analysis in systems().analyses:
         sides = (analysis.values(a.results.answers), analysis.values(b.results.answers))
@@ -192,7 +192,8 @@ def _columns(a: SavedFlight, b: SavedFlight) -> tuple[Delta, ...]:
             if one is None and other is None:
                 continue
             name = f"{analysis.name}.{column.name}"
-            title = f"{analysis.page_title or analysis.name}: {column.meaning.partition(":")[0]}"
+            meaning = column.meaning.partition(":")[0]
+            title = f"{analysis.page_title or analysis.name}: {meaning}"
             found.append(Delta(name, one, other, _difference(name, one, other), None, True, title))
     return tuple(found)
 

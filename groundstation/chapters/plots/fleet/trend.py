@@ -142,7 +142,7 @@ def _intervals(time: Floats, ends: tuple[Floats, Floats], firsts: Floats, title:
 
 
 def _levels(time: Floats, own: FleetTrend, firsts: Set[str]) -> list[AnyMark]:
-    """Level and limits of each run between changes, from its first to its last flight: flat, or along a slope."""
+    """Level and limits of each run between changes: flat, or along a slope."""
     marks: list[AnyMark] = []
     starts = [place for place, name in enumerate(own.flight_id.tolist()) if name in firsts]
     for place, run in enumerate(np.split(np.arange(len(time)), starts) if len(time) else ()):
