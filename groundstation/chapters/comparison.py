@@ -37,6 +37,9 @@ def conclusion(comparison: Comparison) -> Note:
         told.append(
             "; ".join(f"{plain_name(one)}: {_value(one.a)} in A, {_value(one.b)} in B" for one in texts[:4]) + "."
         )
+    verdicts = [one for one in shown if one.is_main and one.name.endswith("verdict") and one.a is not None]
+    if verdicts and not any(one.is_different for one in verdicts):
+        told.append("The verdicts are the same.")
     if not any(one.is_different for one in comparison.deltas):
         told = ["Both gave the same answers." if comparison.deltas else "They have no answer in common."]
     if not told:
@@ -54,7 +57,7 @@ def plain_name(delta: Delta) -> str:
     Examples
     --------
     >>> plain_name(Delta("heading.confidence95_low_deg", 1.0, 2.0)), plain_name(Delta("status", "ok", "ok"))
-    ('Heading: confidence95 low, °', 'Status')
+    ('Heading: 95 % low, °', 'Status')
     >>> plain_name(Delta("forecast.skill.windows.5min.rms_m", 1.0, 2.0))
     'Forecast: rms, m (skill, windows, 5min)'
     """
@@ -63,7 +66,7 @@ def plain_name(delta: Delta) -> str:
     first, *middle = delta.name.split(".")
     if not middle:
         return words(first).capitalize()
-    what, unit = named_quantity(middle[-1])
+    what, unit = named_quantity(middle[-1].replace("confidence95", "95_%"))
     inside = f" ({', '.join(words(part) for part in middle[:-1])})" if len(middle) > 1 else ""
     return f"{words(first).capitalize()}: {what}{f', {unit}' if unit else ''}{inside}"
 

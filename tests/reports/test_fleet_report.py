@@ -227,7 +227,7 @@ def test_a_slope_is_told_on_top_with_its_date(tmp_path: Path) -> None:
     due = np.datetime64(slope.due_utc_ns, "ns").astype("datetime64[D]")
     assert slope.is_slope and "1 slope" in text and f"reaches 3.000° on {due} (95 %" in text
     assert (
-        f"A12: heading error rises by {slope.slope_per_flight:+.3f}° a flight" in text
+        f"A12: heading error rises by {slope.slope_per_flight:+.4f}° a flight" in text
         and "over 20 flights since 2026-05-04" in text
     )
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from groundstation.chapters.fleet.common import aircraft_name, day, figure_of, title_of
+from groundstation.chapters.fleet.common import QUANTITIES, aircraft_name, bounded, day, figure_of, title_of
 from groundstation.chapters.parts import Cell, Grid, Head, Mark
 from groundstation.chapters.wording import ABSENT, number
 from groundstation.results.fleet import FleetResults
@@ -23,7 +23,7 @@ def sloping(fleet: FleetResults) -> list[SlopeRow]:
 
 def sentence_of(one: SlopeRow) -> str:
     """Return a slope as a sentence: how fast, how sure, since when, when it reaches its limit."""
-    slope, low, high = (figure_of(one.quantity, value) for value in one.per_flight)
+    slope, low, high = (_slope(one, value) for value in one.per_flight)
     told = (
         f"{aircraft_name(one.aircraft)}: {title_of(one.quantity)} {_verb(one)} by {slope} a flight (95 % {low} … "
         f"{high}) over {number(one.flights, 0)} flights since {_date(one.since_utc_ns)}, now "
@@ -46,7 +46,7 @@ def grid(fleet: FleetResults) -> Grid | None:
 
 
 def _row(one: SlopeRow) -> tuple[Cell, ...]:
-    slope, low, high = (figure_of(one.quantity, value) for value in one.per_flight)
+    slope, low, high = (_slope(one, value) for value in one.per_flight)
     level, least, most = (figure_of(one.quantity, value) for value in (one.level, one.level_low, one.level_high))
     state: Cell = Mark("bad", "beyond") if one.is_over else Mark("warn", _verb(one)) if one.is_slope else "no slope"
     due = ABSENT
@@ -65,6 +65,12 @@ def _limit(one: SlopeRow) -> str:
 
 def _end(one: SlopeRow) -> str:
     return "no sure end" if one.due_latest_utc_ns is None else _date(one.due_latest_utc_ns)
+
+
+def _slope(one: SlopeRow, value: float) -> str:
+    """Return a slope in the unit of its quantity, with a decimal more where the quantity has few."""
+    _, unit, places = QUANTITIES[one.quantity]
+    return bounded(value, max(places + 1, 3), unit, signed=True)
 
 
 def _verb(one: SlopeRow) -> str:
