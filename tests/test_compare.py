@@ -25,6 +25,7 @@ from groundstation.pipeline.one_flight.flight import Job, run_flight
 from groundstation.pipeline.verbs.alignment import align, events_of
 from groundstation.pipeline.verbs.clip import Wanted, clip
 from groundstation.pipeline.verbs.compare import compare, compare_to, deltas_of
+from groundstation.plots.marks import Curve
 from groundstation.results.answer import by_analysis
 from groundstation.results.comparison import Comparison, Delta
 from groundstation.results.figures import FigureData
@@ -305,10 +306,14 @@ def test_differences_are_drawn_at_the_same_time(folders: dict[str, Path]) -> Non
     plot = COMPARED["overview-heading_deg-difference"](sides)
     assert plot is not None and plot.title == "INS heading, B − A"
     curve = plot.rows[0].panels[0].marks[-1]
+    assert isinstance(curve, Curve)
     known = np.isfinite(curve.y)
     assert known.sum() > 100 and np.abs(curve.y[known]).max() < 0.5 and curve.x[known].min() >= 30.0
     lone = sides_of(compared(folders["good"], folders["good"]), whole, whole)
-    assert not np.nan_to_num(COMPARED["overview-altitude_m-difference"](lone).rows[0].panels[0].marks[-1].y).any()
+    same = COMPARED["overview-altitude_m-difference"](lone)
+    assert same is not None
+    flat = same.rows[0].panels[0].marks[-1]
+    assert isinstance(flat, Curve) and np.isfinite(flat.y).any() and not np.nan_to_num(flat.y).any()
 
 
 def test_a_reference_that_judges_nothing_judges_nothing() -> None:

@@ -68,7 +68,7 @@ def _end(one: SlopeRow) -> str:
 
 
 def _slope(one: SlopeRow, value: float) -> str:
-    """Return a slope in the unit of its quantity, with a decimal more where the quantity has few."""
+    """Return a slope in the unit of its quantity, with a decimal more."""
     _, unit, places = QUANTITIES[one.quantity]
     return bounded(value, max(places + 1, 3), unit, signed=True)
 

@@ -195,6 +195,8 @@ def difference(sides: Sequence[PlottedSide], told: Overlay[Any]) -> Plot | None:
     if len(drawn) < 2:
         return None
     (a, one), (b, other) = drawn
+    if one.values is None:
+        return None
     time, theirs = one.time_s + a.offset_s, other.time_s + b.offset_s
     is_angle = told.name.endswith("heading_deg")
     change = _held(theirs, other.values, time, is_angle=is_angle) - one.values
