@@ -11,6 +11,7 @@ from groundstation.simulation.session_scenario import load_session
 from groundstation.systems.cooperative import estimate
 from groundstation.systems.cooperative.arrays import CooperativeLinks, CooperativeTracks
 from groundstation.systems.cooperative.estimate import estimate_session
+from groundstation.systems.cooperative.geometry import bound_of
 from groundstation.systems.cooperative.tracks import AlgorithmRun
 from tests.systems.cooperative.example import believed
 
@@ -20,7 +21,6 @@ NAMES = ("centralised", "smoothed")
 def test_ranges_fit_the_answer_when_its_own_clocks_are_taken_off(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the clocks that the filter knew at the time 11.4 m are left of 10 m of noise."""
     bounds: list[str] = []
-    bound_of = estimate.bound_of
 
     def counted(*given: Any) -> AlgorithmRun:
         bounds.append(str(given[-1]))
