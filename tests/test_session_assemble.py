@@ -263,6 +263,17 @@ def test_two_way_ranges_have_no_clock_in_them() -> None:
         assert found.session.ranges.take(slice(0, 5)).is_two_way is two_way
 
 
+def test_a_negative_range_there_and_back_is_left_out_and_no_clock_explains_it() -> None:
+    a, b, c = recorded()
+    read = a["link.B"].values("pseudorange_m").copy()
+    read[:3] = -20.0
+    flights = (with_values(a, "link.B", "pseudorange_m", read), b, c)
+    found = session_from_flights(flights, stations_of(), settings=SessionSettings(two_way=True))
+    (told,) = (one for one in found.findings if one.code == "session.negative_range")
+    assert (told.severity, told.count, told.text) == ("warn", 3, "left out 3 negative ranges that no clock explains")
+    assert len(found.session.ranges) == len(simulated().session.ranges) - 3
+
+
 def test_a_time_of_transmission_that_is_not_that_of_the_log() -> None:
     a, b, c = recorded()
     sent = a["link.B"].values("transmission_time_s").copy()

@@ -1,6 +1,7 @@
 """What every verb makes of the folder of a session."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from groundstation.simulation.session_log import write_session
 from groundstation.systems.cooperative.answer import CooperativeResult
 from groundstation.systems.cooperative.arrays import CooperativeTracks
 from groundstation.systems.cooperative.comparison_plots import session_errors
+from groundstation.systems.cooperative.graph_files import g2o_file
 from groundstation.viewer.fleet_catalog import SESSIONS, catalog_server
 from tests.recording_contents import Contents
 from tests.saved import load
@@ -175,6 +177,23 @@ def test_a_session_goes_to_a_graph_whose_ranges_fit_its_poses(session: Path, tmp
     away = [np.linalg.norm(places[a] - places[b]) - read for a, b, (read, _) in ranges]
     assert len(ranges) > 100 and np.std(away) < 30.0, "10 m of noise, and what the filter did not know yet"
     assert {round(1.0 / information**0.5, 6) for _, _, (_, information) in ranges} == {10.0}
+
+
+def test_a_station_that_the_answer_surveys_is_free_in_the_graph(session: Path, tmp_path: Path) -> None:
+    results = load(session).results
+    answer = results.answer(CooperativeResult)
+    assert answer is not None and answer.stations is not None
+    one, two = answer.stations.rows
+    two = replace(two, verdict="off", used_sigma_m=900.0, survey_north_m=300.0, survey_east_m=-400.0)
+    stations = replace(answer.stations, rows=(one, two))
+    surveyed = replace(results, answers={**results.answers, "cooperative": replace(answer, stations=stations)})
+    (tmp_path / "before.g2o").write_text(g2o_file(results, "")[""])
+    (tmp_path / "after.g2o").write_text(g2o_file(surveyed, "")[""])
+    (before, _, fixed), (after, _, free) = graph_of(tmp_path / "before.g2o"), graph_of(tmp_path / "after.g2o")
+    assert (fixed["FIX"], free["FIX"]) == (2, 1)
+    assert after[0] == pytest.approx(before[0])
+    assert np.linalg.norm(after[1] - before[1]) == pytest.approx(500.0, abs=0.1)
+    assert (after[1] - before[1])[:2] == pytest.approx([-400.0, 300.0], abs=10.0)  # axes of another point
 
 
 def test_what_a_session_cannot_be_written_as_is_said(

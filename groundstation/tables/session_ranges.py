@@ -99,7 +99,7 @@ def _link(
     sent_ns = np.where(known, sent_ns + group_ns, arrival_ns - flown_ns)
     no_number = is_there & ~np.isfinite(read)
     negative = np.isfinite(read) & (read < 0.0)
-    absurd = negative & (read < -settings.negative_limit_m)
+    absurd = negative & (read < (0.0 if settings.two_way else -settings.negative_limit_m))
     late = np.isfinite(read) & (np.abs(arrival_ns - flown_ns - sent_ns) > 2 * int(settings.clock_limit_s * NS_PER_S))
     _tell(findings, "not_a_number", "left out {} ranges that are no numbers", no_number, table, name)
     _tell(findings, "negative_range", "left out {} negative ranges that no clock explains", absurd, table, name)

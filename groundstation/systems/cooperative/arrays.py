@@ -48,8 +48,8 @@ class CooperativeMap(Arrays, figure="cooperative_map", digits=_TIME):
 class CooperativeLinks(Arrays, figure="cooperative_links", digits={**_TIME, "*_m": 3}):
     """Innovations of every range of one algorithm; mark 1 used, -1 gated.
 
-    ``range_m`` is the range as measured less clocks and biases as they were estimated, ``range_sigma_m`` the sigma of
-    the measurement; NaN where it is none.
+    ``range_m`` is the range as measured less clocks and biases as the default answer has them, ``range_sigma_m`` the
+    sigma of the measurement; NaN where it is none.
     """
 
     time_s: Floats

@@ -81,7 +81,9 @@ def estimate_session(
     default = _run_of(judged, DEFAULT)
     predicting = _run_of(judged, KNOWN_ON_BOARD).run
     bound = bound_of(prepared.session, settings, truth)
-    smoothing_bound = bound_of(prepared.session, settings, truth, DEFAULT) if DEFAULT in algorithms else bound
+    smoothing_bound = bound
+    if truth and DEFAULT in algorithms:
+        smoothing_bound = bound_of(prepared.session, settings, truth, DEFAULT)
     geometry = geometry_of(prepared.session, settings, default.run)
     findings = [
         *prepared.findings,
@@ -117,7 +119,7 @@ def estimate_session(
             figures.tracks_figure([(one.run, one.judgements) for one in judged]),
             figures.geometry_figure(geometry, bound),
             figures.map_figure([one.run for one in judged]),
-            figures.links_figure(prepared, predicting),
+            figures.links_figure(prepared, predicting, default.run),
             figures.traffic_figure([one.run for one in judged]),
             *([figures.stations_figure(stations)] if stations else []),
         ),

@@ -19,7 +19,7 @@ from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.geometry import Geometry
 from groundstation.systems.cooperative.loop_types import KINDS, PEER, POINT
 from groundstation.systems.cooperative.stations_answer import StationsAnswer
-from groundstation.systems.cooperative.tracks import AlgorithmRun
+from groundstation.systems.cooperative.tracks import AlgorithmRun, VehicleTrack
 
 
 def source_name(prepared: Prepared, kind: int, source: int) -> str:
@@ -86,12 +86,15 @@ def map_figure(runs: Sequence[AlgorithmRun]) -> CooperativeMap:
     )
 
 
-def links_figure(prepared: Prepared, run: AlgorithmRun) -> CooperativeLinks:
-    """Innovations of every range of one algorithm; mark 1 used, -1 gated."""
+def links_figure(prepared: Prepared, run: AlgorithmRun, answer: AlgorithmRun) -> CooperativeLinks:
+    """Innovations of every range of one algorithm; mark 1 used, -1 gated.
+
+    Clocks and biases that are taken off the ranges are those of the answer.
+    """
     judged, events = run.judged, prepared.events
     kind, source, receiver = (part[judged.event].tolist() for part in (events.kind, events.source, events.receiver))
     names = [vehicle.name for vehicle in prepared.vehicles]
-    range_m, sigma_m = _ranges(prepared, run)
+    range_m, sigma_m = _ranges(prepared, run, answer.tracks)
     return CooperativeLinks(
         time_s=events.time_s[judged.event],
         receiver=np.array([names[one] for one in receiver], dtype=np.str_),
@@ -104,7 +107,7 @@ def links_figure(prepared: Prepared, run: AlgorithmRun) -> CooperativeLinks:
     )
 
 
-def _ranges(prepared: Prepared, run: AlgorithmRun) -> tuple[FloatArray, FloatArray]:
+def _ranges(prepared: Prepared, run: AlgorithmRun, tracks: Sequence[VehicleTrack]) -> tuple[FloatArray, FloatArray]:
     """Return ranges less clocks and biases as estimated, and their sigmas.
 
     NaN for what is no range.
@@ -117,7 +120,7 @@ def _ranges(prepared: Prepared, run: AlgorithmRun) -> tuple[FloatArray, FloatArr
     )
     is_range = is_first & np.isin(kind, (PEER, POINT)) & np.isfinite(events.value_m[event])
     range_m = np.where(is_range, events.value_m[event], np.nan)
-    for who, (vehicle, track) in enumerate(zip(prepared.vehicles, run.tracks, strict=True)):
+    for who, (vehicle, track) in enumerate(zip(prepared.vehicles, tracks, strict=True)):
         if not len(track.time_s):
             continue
         for state, ends in (

@@ -1,10 +1,11 @@
 """Tracks and ranges of a session as files of robot people: TUM and a g2o graph.
 
 TUM (a file a vehicle): ``time x y z qx qy qz qw``, seconds UTC where the session has UTC. g2o (one file): a vertex
-``VERTEX_SE3:QUAT`` for each vehicle and epoch, ``VERTEX_TRACKXYZ`` and ``FIX`` for ground points, ``EDGE_SE3:QUAT`` for
-the dead reckoning from epoch to epoch, and ``EDGE_RANGE id id range information`` for ranges. g2o has no edge of its
-own for a range alone, and readers of g2o and gtsam leave lines with unknown tags out; the tag is that of range-aided
-solvers (PyFG), with the information in place of the variance.
+``VERTEX_SE3:QUAT`` for each vehicle and epoch, ``VERTEX_TRACKXYZ`` for ground points, with ``FIX`` where the answer
+takes their place as exact (else it is the surveyed one), ``EDGE_SE3:QUAT`` for the dead reckoning from epoch to epoch,
+and ``EDGE_RANGE id id range information`` for ranges. g2o has no edge of its own for a range alone, and readers of g2o
+and gtsam leave lines with unknown tags out; the tag is that of range-aided solvers (PyFG), with the information in
+place of the variance.
 
 Axes are east, north and up, metres from the origin of the session, or from the first ground point or vehicle where the
 session is on the globe. Attitudes are not estimated: the unit quaternion stands for them.
@@ -50,9 +51,9 @@ class _Graph:
         first = place_m[0] if points is None else np.array([points.x_m[0], points.y_m[0], points.z_m[0]])
         self.origin = None if self._is_local else geodetic_deg_m(first)
         self._first, self._axes = first, None if self._is_local else ecef_from_n(*self.origin[:2])  # type: ignore[index]
+        self.free_points: set[str] = set()
         if points is not None:
-            at = self._level(np.stack([points.x_m, points.y_m, points.z_m], axis=1))
-            self.points = dict(zip(points.label.tolist(), at, strict=True))
+            self._take_points(points, answer)
         for name in answer.vehicle_names:
             mine = (tracks.vehicle == name) & (tracks.algorithm == self.algorithm)
             reckoned = (tracks.vehicle == name) & (tracks.algorithm == RECKONING)
@@ -64,6 +65,19 @@ class _Graph:
                 east, north = tracks.sigma_east_m[reckoned], tracks.sigma_north_m[reckoned]
                 up = np.nan_to_num(tracks.sigma_up_m[reckoned], nan=0.0)
                 self.variances[name] = np.stack([east, north, up], axis=1) ** 2
+
+    def _take_points(self, points: SessionPoints, answer: CooperativeResult) -> None:
+        """Take the ground points as the answer has them."""
+        places = np.stack([points.x_m, points.y_m, points.z_m], axis=1)
+        sigmas = dict(zip(points.label.tolist(), points.position_sigma_m.tolist(), strict=True))
+        for row in answer.stations.rows if answer.stations is not None else ():
+            sigmas[row.station] = row.used_sigma_m
+            if row.survey_north_m is not None and row.survey_east_m is not None:
+                at = points.label.tolist().index(row.station)
+                axes = np.eye(3) if self._is_local else ecef_from_n(*geodetic_deg_m(places[at])[:2])
+                places[at] += axes[:, :2] @ [row.survey_north_m, row.survey_east_m]
+        self.free_points = {name for name, sigma_m in sigmas.items() if sigma_m > 0.0}
+        self.points = dict(zip(points.label.tolist(), self._level(places), strict=True))
 
     def _level(self, place_m: FloatArray) -> FloatArray:
         """Return places as east, north, up."""
@@ -132,7 +146,8 @@ def g2o_file(results: FlightResults, algorithm: str) -> Mapping[str, str]:
     numbers: dict[str, int] = {}
     lines = [graph.head()]
     for number, (name, place) in enumerate(graph.points.items()):
-        lines += [f"# {number}: {name}\n", f"VERTEX_TRACKXYZ {number} {_numbers(place)}\n", f"FIX {number}\n"]
+        lines += [f"# {number}: {name}\n", f"VERTEX_TRACKXYZ {number} {_numbers(place)}\n"]
+        lines += [] if name in graph.free_points else [f"FIX {number}\n"]
         numbers[name] = number
     free = len(numbers)
     for name, track in graph.tracks.items():

@@ -1,5 +1,6 @@
 """Ground stations judged: found when off, left alone when right, and what their error does to the answer."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from groundstation.systems.cooperative.answer import CooperativeResult
 from groundstation.systems.cooperative.estimate import estimate_session
 from groundstation.systems.cooperative.events import prepare
 from groundstation.systems.cooperative.smoother.smoothed import run_smoothed
+from groundstation.systems.cooperative.stations import response
 from groundstation.systems.cooperative.stations.hypotheses import FOUND, chance_of, noncentrality
 from groundstation.systems.cooperative.stations.information import EACH, station_information
 from groundstation.systems.cooperative.stations.judge import StationJudgement, judge_stations, survey_of
@@ -67,6 +69,25 @@ def test_a_metre_of_a_station_moves_the_answer_as_it_is_said_to() -> None:
             said = information.answer[:, vehicle, :, EACH + axis]
             at = np.searchsorted(one.time_s, solved.knots.time_s).clip(0, len(real) - 1)
             assert np.abs(real[at] - said).max() < 0.02
+
+
+def test_a_long_session_is_passed_in_pieces_with_the_same_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Covariances at all knots of 20 aircraft over two hours are more than a gigabyte."""
+    scenario = replace(load_session("local-three-two-points"), duration_s=120.0)
+    session = simulate_session(scenario, SEED).session
+    _, solved, _ = station_information(session, BY_NAME["two-right"].settings())
+    columns = np.random.default_rng(1).standard_normal((len(solved.problem.residual), 2))
+    one_covariance = 8 * len(solved.problem.start) ** 2
+    found, most = [], []
+    for kept in (1e8, 10.0 * one_covariance):
+        monkeypatch.setattr(response, "KEPT_BYTES", kept)
+        tracemalloc.start()
+        found.append(response.respond(solved.problem, columns))
+        most.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    for name in ("moved", "left", "duals"):
+        assert getattr(found[1], name) == pytest.approx(getattr(found[0], name), abs=1e-9)
+    assert most[0] - most[1] > 0.5 * one_covariance * solved.problem.knots
 
 
 def test_datums_are_those_of_proj() -> None:

@@ -1,11 +1,15 @@
 """Response of the smoother's problem to columns of residuals."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.systems.cooperative.smoother.chain import Problem, add_blocks, turned
+from groundstation.systems.cooperative.smoother.chain import KEPT_BYTES, Problem, add_blocks, turned
+
+_State = tuple[FloatArray, FloatArray]  # covariance and means after a knot's rows
 
 
 @dataclass(frozen=True)
@@ -38,29 +42,10 @@ def respond(problem: Problem, columns: FloatArray) -> Response:
     """
     residual = np.column_stack([columns, problem.residual])
     size, width = len(problem.start), residual.shape[1]
-    P, M = np.diag(problem.variance), np.zeros((size, width))
-    M[:, -1] = problem.start
-    kept = []
-    for knot in range(problem.knots):
-        if knot:
-            for span, phi, noise in zip(problem.spans, problem.phi, problem.noise, strict=True):
-                _turn(M, span, phi[knot - 1])
-                turned(P, span, phi[knot - 1])
-                add_blocks(P, span, noise[knot - 1])
-            M[:, -1] += problem.defect[knot - 1]
-        H, part = _dense(problem, knot)
-        weighted = H.T * problem.weight[part]
-        A = weighted @ H
-        U = weighted @ residual[part] - A @ M
-        after = np.asarray(np.linalg.solve(np.eye(size) + P @ A, P))
-        P = 0.5 * (after + after.T)
-        M = M + P @ U
-        kept.append((P.copy(), U))
     dual, L = np.zeros((size, width)), np.zeros((size, size))
     spread = [np.zeros(noise.shape[1:]) for noise in problem.noise]
     duals = np.empty((problem.knots, size, width))
-    for knot in range(problem.knots - 1, -1, -1):
-        after, U = kept[knot]
+    for knot, after, U in _backwards(problem, residual):
         H, part = _dense(problem, knot)
         A = (H.T * problem.weight[part]) @ H
         both = U + dual
@@ -94,6 +79,53 @@ def respond(problem: Problem, columns: FloatArray) -> Response:
         H, part = _dense(problem, knot)
         left[part] -= H @ moved[knot]
     return Response(moved, left, duals, (np.diag(L).copy(), *spread))
+
+
+def _backwards(problem: Problem, residual: FloatArray) -> Iterator[tuple[int, FloatArray, FloatArray]]:
+    """Yield the knots from the last to the first with the covariance after their rows and what these tell.
+
+    What a pass keeps is bounded: beyond it, pieces are passed again.
+    """
+    size = len(problem.start)
+    pieces = min(problem.knots, max(1, int(np.ceil(8.0 * size * size * problem.knots / KEPT_BYTES))))
+    edges = np.linspace(0, problem.knots, pieces + 1).astype(int).tolist()
+    means = np.zeros((size, residual.shape[1]))
+    means[:, -1] = problem.start
+    state: _State = np.diag(problem.variance), means
+    starts = []
+    for first, last in pairwise(edges):
+        starts.append(state)
+        for knot in range(first, last) if last < problem.knots else ():
+            state = _forward(problem, residual, state, knot)[:2]
+    for first, last in reversed(list(pairwise(edges))):
+        state, kept = starts.pop(), []
+        for knot in range(first, last):
+            P, M, U = _forward(problem, residual, state, knot)
+            state = P, M
+            kept.append((knot, P, U))
+        while kept:
+            yield kept.pop()
+
+
+def _forward(
+    problem: Problem, residual: FloatArray, state: _State, knot: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return covariance and means after a knot's rows, and what the rows tell."""
+    P, M = state
+    if knot:
+        P, M = P.copy(), M.copy()
+        for span, phi, noise in zip(problem.spans, problem.phi, problem.noise, strict=True):
+            _turn(M, span, phi[knot - 1])
+            turned(P, span, phi[knot - 1])
+            add_blocks(P, span, noise[knot - 1])
+        M[:, -1] += problem.defect[knot - 1]
+    H, part = _dense(problem, knot)
+    weighted = H.T * problem.weight[part]
+    A = weighted @ H
+    U = weighted @ residual[part] - A @ M
+    after = np.asarray(np.linalg.solve(np.eye(len(P)) + P @ A, P))
+    P = 0.5 * (after + after.T)
+    return P, M + P @ U, U
 
 
 def _dense(problem: Problem, knot: int) -> tuple[FloatArray, slice]:
