@@ -72,7 +72,7 @@ def _check(one: Approach, at: StabilisedAt, floor_m: float | str | bool | None) 
 def _kept(at: StabilisedAt) -> str:
     """Return where a limit was first left, and from where all were kept."""
     if at.lost is None:
-        return "No limit was left." if at.stable_m is not None else ""
+        return "Every limit was kept." if at.stable_m is not None else ""
     lost = at.lost
     when = "at the check height already" if lost.is_from_the_start else f"at {number(lost.height_m, 0, 'm')}"
     again = f"all kept again below {number(at.stable_m, 0, 'm')}" if at.stable_m is not None else "not regained"

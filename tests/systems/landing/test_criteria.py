@@ -175,6 +175,16 @@ def test_what_a_log_lacks_is_not_logged() -> None:
     for name in ("thrust", "tailwind", "landing_flap", "landing_pitch", "landing_load"):
         assert criterion(one, name).state == "not logged", name
     assert one.score is None, "no weights of the user"
+    air = criterion(one, "threshold_speed")
+    assert (air.state, air.reason) == ("not logged", "not in the log"), "no airspeed at all"
+
+
+def test_an_airspeed_that_ends_before_the_threshold_is_not_measured_there() -> None:
+    heights_m = heights()
+    speed = np.where(heights_m > 60.0, 70.0, np.nan)
+    one = approach(with_topic(flown(), "air", indicated_airspeed_mps=speed))
+    air = criterion(one, "threshold_speed")
+    assert (air.state, air.reason) == ("not measured", "no indicated airspeed at the threshold")
 
 
 def test_a_go_around_has_criteria_of_the_air_alone() -> None:
