@@ -225,7 +225,7 @@ def _second(found: Evidence, made: SimulatedTouchdown) -> float:
 
 def _median(values: ArrayLike) -> float:
     """Return the median; NaN where nothing was measured."""
-    return float(np.median(values)) if np.size(values) else float("nan")
+    return float(np.median(np.asarray(values, dtype=np.float64))) if np.size(values) else float("nan")
 
 
 def _share(scaled: list[float]) -> float:

@@ -20,6 +20,7 @@ from groundstation.systems.known import Known
 from groundstation.systems.landing.analysis import LANDING
 from groundstation.systems.landing.answer import Approach, LandingResult
 from groundstation.systems.landing.evidence import Evidence, evidence_of
+from groundstation.systems.landing.finals import _rolls_on
 from groundstation.systems.landing.findings import findings_of
 from groundstation.systems.landing.path import path_of
 from groundstation.systems.landing.second_contact import second_contacts
@@ -186,6 +187,13 @@ def test_a_touch_and_go_is_one() -> None:
     )  # fmt: skip
     assert told.outcome == "touch-and-go" and told.touchdown is not None
     assert told.touchdown.time_s == pytest.approx(simulated.contact_s, abs=0.5)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_roll_without_any_speed_is_no_touch_and_go() -> None:
+    path = path_of(made().flight, LandingSettings())
+    silent = replace(path, ground_speed_mps=np.full(len(path.time_s), np.nan))
+    assert _rolls_on(path, 90.0, 92.0) and not _rolls_on(silent, 90.0, 92.0)
 
 
 def test_what_is_set_down_has_no_touchdown() -> None:
