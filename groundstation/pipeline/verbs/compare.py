@@ -192,7 +192,7 @@ def _columns(a: SavedFlight, b: SavedFlight) -> tuple[Delta, ...]:
             if one is None and other is None:
                 continue
             name = f"{analysis.name}.{column.name}"
-            title = f"{analysis.page_title or analysis.name}: {column.meaning.partition(":")[0]}"
+            title = f"{analysis.page_title or analysis.name}: {column.meaning.partition(':')[0]}"
             found.append(Delta(name, one, other, _difference(name, one, other), None, True, title))
     return tuple(found)
 
