@@ -3,6 +3,10 @@
 import importlib.util
 from pathlib import Path
 
+import typer.main
+
+from groundstation.cli.main import app
+
 SOURCE = Path(__file__).parent.parent / "docs" / "site" / "reference.py"
 
 
@@ -17,3 +21,9 @@ def test_codes_that_stand_in_a_row_or_by_name_are_listed() -> None:
     assert "closed in the table" in rows["| `landing.runway_closed`"]
     assert "| `landing.sensitivity`" in rows, "by name"
     assert "| `landing.second_contact`" in rows and "| `landing.motion`" not in rows
+
+
+def test_every_verb_has_a_row_in_the_manual() -> None:
+    text = (SOURCE.parents[1] / "verbs.md").read_text(encoding="utf-8")
+    verbs = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    assert [name for name, verb in verbs.items() if not verb.hidden and f"`{name} " not in text] == []

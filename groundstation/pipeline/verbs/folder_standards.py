@@ -38,7 +38,7 @@ def standard_of(name_or_path: str) -> ChosenStandard | None:
     Raises
     ------
     SettingsError
-        For an unknown name, or a file that cannot be read.
+        For an unknown name, a file that cannot be read, or one of an unknown kind.
     """
     for one in systems().folder_standards:
         if name_or_path.lower() in one.shipped.names():
@@ -50,7 +50,13 @@ def standard_of(name_or_path: str) -> ChosenStandard | None:
         return None
     file = ShippedToml("groundstation", "", "standard").read(name_or_path)
     kind = file.table.get("kind")
-    return next((ChosenStandard(one, file) for one in systems().folder_standards if one.kind == kind), None)
+    if kind is None:
+        return None
+    kinds = {one.kind: one for one in systems().folder_standards}
+    if kind not in kinds:
+        expected = f"{', '.join(map(repr, kinds))}; left out, the standard is one of the INS"
+        raise SettingsError(f"{file.where}, key kind", repr(kind), expected)
+    return ChosenStandard(kinds[kind], file)
 
 
 def hold_to(out: Path, standard: FolderStandard, file: TomlFile, folder: Path | None = None) -> Held:

@@ -42,7 +42,7 @@ from groundstation.systems.landing.answer import (
     StabilisedAt,
 )
 from groundstation.systems.landing.criteria_chapter import criteria_parts
-from groundstation.systems.landing.runway_chapter import along_facts, along_told, runway_facts
+from groundstation.systems.landing.runway_chapter import along_facts, along_told, runway_facts, with_sigma
 from groundstation.systems.landing.touchdown_chapter import SINK_TIME, touchdown_parts
 
 LEAD = "How each approach was flown against its runway, and where it touched down."
@@ -242,12 +242,16 @@ def _accuracy(error: PositionError) -> str:
 
 def _error(one: Approach, error: PositionError) -> Grid | Facts | None:
     if error.state == "measured":
-        rate = f"{number(error.rate_mps, 2, signed=True)} ± {number(error.rate_sigma_mps, 2, 'm/s')}"
+        rate = with_sigma(error.rate_mps, error.rate_sigma_mps, 2, "m/s")
         pairs = [
-            ("At the threshold", _with_sigma(error.error_m, error.sigma_m), interval(error.confidence95_m, 0, "m")),
+            (
+                "At the threshold",
+                with_sigma(error.error_m, error.sigma_m),
+                f"95 % {interval(error.confidence95_m, 0, 'm')}",
+            ),
             ("Growth", rate, "along the final"),
-            ("On the roll-out", _with_sigma(error.rollout_error_m, error.rollout_sigma_m), "centre line as truth"),
-            ("Roll-out − final", _with_sigma(error.change_m, error.change_sigma_m), "each checks the other"),
+            ("On the roll-out", with_sigma(error.rollout_error_m, error.rollout_sigma_m), "centre line as truth"),
+            ("Roll-out − final", with_sigma(error.change_m, error.change_sigma_m), "each checks the other"),
             ("Per hour", number(error.drift_nmi_per_h, 2, "nmi/h"), "over the flight so far, across the course only"),
             ("Residuals", number(error.residual_ratio, 2), "RMS over expected RMS"),
             *((f"σ by {part.name}", number(part.sigma_m, 1, "m"), "") for part in error.parts),
@@ -257,7 +261,7 @@ def _error(one: Approach, error: PositionError) -> Grid | Facts | None:
         return None
     pair = (
         "Roll-out − final",
-        _with_sigma(error.change_m, error.change_sigma_m),
+        with_sigma(error.change_m, error.change_sigma_m),
         "on the course of the final, continued",
     )
     return Facts(f"Approach {one.number}: {error.topic} across the course", (pair,))
@@ -267,14 +271,10 @@ def _height(one: Approach, error: HeightError) -> Facts | None:
     if error.state != "measured":
         return None
     pairs = [
-        ("On the roll-out", _with_sigma(error.error_m, error.sigma_m), interval(error.confidence95_m, 0, "m")),
+        ("On the roll-out", with_sigma(error.error_m, error.sigma_m), f"95 % {interval(error.confidence95_m, 0, 'm')}"),
         *((f"σ by {part.name}", number(part.sigma_m, 1, "m"), "") for part in error.parts),
     ]
     return Facts(f"Approach {one.number}: altitude of {error.topic}, by the elevation of the runway", tuple(pairs))
-
-
-def _with_sigma(value: float | None, sigma: float | None) -> str:
-    return f"{number(value, 1, signed=True)} ± {number(sigma, 1, 'm')}" if is_number(value) else ABSENT
 
 
 def _protection(one: Approach) -> Facts | None:
@@ -303,7 +303,7 @@ def _basis(one: Approach) -> Facts:
         ("Height", typeset(one.height_source or ABSENT), ""),
         (
             "Runway",
-            f"{_course(one)} ± {number(runway.course_sigma_deg, 2, '°')}",
+            f"{_course(one)}, σ {number(runway.course_sigma_deg, 2, '°')}",
             f"placed by {runway.placed_by}" + (f", threshold {runway.place_reason}" if runway.place_reason else ""),
         ),
         (
@@ -318,7 +318,7 @@ def _basis(one: Approach) -> Facts:
         ),
     ]
     if one.sensitivity is not None and is_number(one.sensitivity.ratio):
-        value = f"{number(one.sensitivity.ratio, 2)} ± {number(one.sensitivity.sigma, 2)}"
+        value = f"{number(one.sensitivity.ratio, 2)}, σ {number(one.sensitivity.sigma, 2)}"
         pairs.append(("Positions over guidance", value, "1 if sense and width of the course are right"))
     return Facts(f"Approach {one.number}: basis", tuple(pairs), compact=False)
 

@@ -243,12 +243,13 @@ def _threshold(seen: _Seen, touchdown: Touchdown) -> dict[str, _Value]:
     sigma = math.hypot(settings.height_sigma_m, sink * time_sigma_s)
     at = Place(crossing_s, height, 0.0)
     indicated = _at(seen.path.time_s, seen.logged.indicated_mps, crossing_s)
-    value, reason = indicated, "" if indicated is not None else "no indicated airspeed logged"
+    by_air = seen.logged.sources.get("indicated", "")
+    value, reason = indicated, "" if indicated is not None or not by_air else "no indicated airspeed at the threshold"
     if indicated is not None and settings.reference_speed_mps is not None:
         value, reason = indicated - settings.reference_speed_mps, "above the reference speed"
     return {
         "threshold_height": _Value(height, None if height is None else sigma, at, by),
-        "threshold_speed": _Value(value, None, at, seen.logged.sources.get("indicated", ""), reason),
+        "threshold_speed": _Value(value, None, at, by_air, reason),
     }
 
 

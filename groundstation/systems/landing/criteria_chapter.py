@@ -1,5 +1,6 @@
 """Criteria of an approach as tables of its chapter: state, value, limit, place, source."""
 
+import math
 from collections.abc import Iterable
 
 from groundstation.base.quantiles import NORMAL_95
@@ -72,7 +73,7 @@ def _check(one: Approach, at: StabilisedAt, floor_m: float | str | bool | None) 
 def _kept(at: StabilisedAt) -> str:
     """Return where a limit was first left, and from where all were kept."""
     if at.lost is None:
-        return "No limit was left." if at.stable_m is not None else ""
+        return "Every limit was kept." if at.stable_m is not None else ""
     lost = at.lost
     when = "at the check height already" if lost.is_from_the_start else f"at {number(lost.height_m, 0, 'm')}"
     again = f"all kept again below {number(at.stable_m, 0, 'm')}" if at.stable_m is not None else "not regained"
@@ -116,8 +117,19 @@ def _not_logged(titles: Iterable[str], reason: str = NO_VALUE) -> list[tuple[Cel
 
 
 def _value(one: Criterion) -> str:
-    text = number_with_unit(significant(one.value, 3), unit_sign(one.unit))
-    return f"{text} ± {significant(NORMAL_95 * one.sigma, 2)}" if one.sigma else text
+    """Return a value with its 95 % interval, to the digits that this lets it have.
+
+    Examples
+    --------
+    >>> _value(Criterion(name="tailwind", state="met", unit="m/s", value=0.757, sigma=2.5))
+    '0.8 ± 4.9\u202fm/s'
+    """
+    unit = unit_sign(one.unit)
+    if one.value is None or not one.sigma:
+        return number_with_unit(significant(one.value, 3), unit)
+    wide = NORMAL_95 * one.sigma
+    places = max(0, 1 - math.floor(math.log10(wide)))
+    return number_with_unit(f"{number(one.value, places)} ± {number(wide, places)}", unit)
 
 
 def limits_text(one: Criterion) -> str:

@@ -112,7 +112,8 @@ def _rolls_on(path: FlightPath, down_s: float, again_s: float) -> bool:
     """Tell whether the aircraft flies again without having become slow."""
     rows = (path.time_s >= down_s) & (path.time_s <= again_s)
     speed = path.ground_speed_mps[rows]
-    return bool(again_s - down_s <= LONGEST_ROLL_S and speed.size and np.nanmin(speed) > 2.0 * SLOWEST_MPS)
+    speed = speed[np.isfinite(speed)]
+    return bool(again_s - down_s <= LONGEST_ROLL_S and speed.size and np.min(speed) > 2.0 * SLOWEST_MPS)
 
 
 def _lowest(path: FlightPath, first: int, last: int, settings: LandingSettings) -> int | None:
@@ -235,7 +236,8 @@ def _longest_on_guidance(path: FlightPath, first: int, last: int, settings: Land
     fast = [
         (first + low, first + high)
         for low, high in found
-        if np.nanmedian(path.ground_speed_mps[first + low : first + high]) >= settings.speed_min_mps
+        if np.isfinite(speed := path.ground_speed_mps[first + low : first + high]).any()
+        and np.nanmedian(speed) >= settings.speed_min_mps
     ]
     longest = max(fast, key=lambda one: path.time_s[one[1] - 1] - path.time_s[one[0]], default=None)
     return None if longest is None else slice(*longest)

@@ -99,6 +99,13 @@ def _fits_the_end_better(error: AlongError) -> bool:
     return abs(error.error_m) > 2.0 * error.sigma_m and abs(error.error_from_end_m) < abs(error.error_m)
 
 
+def with_sigma(value: float | None, sigma: float | None, places: int = 1, unit: str = "m") -> str:
+    """Return a signed value with its sigma; ± stands for 95 % elsewhere in this chapter."""
+    if not is_number(value):
+        return ABSENT
+    return f"{number(value, places, unit, signed=True)}, σ {number(sigma, places, unit)}"
+
+
 def along_facts(one: Approach, error: AlongError) -> Facts | None:
     """Return the error along the course; None where it is not measured."""
     if error.state != "measured":
@@ -106,8 +113,8 @@ def along_facts(one: Approach, error: AlongError) -> Facts | None:
     pairs = [
         (
             "At the threshold",
-            f"{number(error.error_m, 1, signed=True)} ± {number(error.sigma_m, 1, 'm')}",
-            interval(error.confidence95_m, 0, "m"),
+            with_sigma(error.error_m, error.sigma_m),
+            f"95 % {interval(error.confidence95_m, 0, 'm')}",
         ),
     ]
     if is_number(error.error_from_end_m):

@@ -5,6 +5,7 @@ import numpy as np
 from groundstation.systems.landing.evidence import Evidence
 from groundstation.systems.landing.touchdown_answer import SecondContact
 from groundstation.systems.landing.witnesses import SLOWEST_LOAD_HZ, jumps_of
+from groundstation.tables.motion import runs
 
 IMPACT_S = 0.4  # of the contact before, which is left out
 SOONEST_S, LATEST_S = 0.5, 6.0  # of a second contact behind the first
@@ -24,7 +25,8 @@ def second_contacts(evidence: Evidence) -> tuple[SecondContact, ...]:
         if not SOONEST_S <= at_s - evidence.time_s <= LATEST_S or size_g < SECOND_G:
             continue
         between = (load.time_s > before_s + IMPACT_S) & (load.time_s < at_s)
-        light_s = float(np.count_nonzero(load.load_g[between] < LIGHT_G)) / load.rate_hz
+        spells = runs(load.load_g[between] < LIGHT_G)  # scattered samples are the noise of a roll-out
+        light_s = max((last - first for first, last in spells), default=0) / load.rate_hz
         mean_g = float(np.mean(load.load_g[between])) if between.any() else 1.0
         if light_s >= LIGHT_S and mean_g < 1.0:
             here = np.flatnonzero((load.time_s >= at_s) & (load.time_s <= at_s + IMPACT_S + 0.1))

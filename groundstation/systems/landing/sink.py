@@ -46,7 +46,8 @@ def _by_height(heights: Heights, ground: Ground | None, evidence: Evidence) -> S
     covariance = np.linalg.inv(design.T @ design / noise**2 + prior)
     fitted = covariance @ (design.T @ heights.height_m[rows]) / noise**2
     unsteady = UNSTEADY_MPS * (window_s / WINDOW_S) ** 1.5
-    sigma = np.sqrt(covariance[1, 1] + (2.0 * fitted[2] * evidence.sigma_s) ** 2 + unsteady**2)
+    risen = 0.0 if ground is None else heights.kind.uneven * _speed(heights, evidence)
+    sigma = np.sqrt(covariance[1, 1] + (2.0 * fitted[2] * evidence.sigma_s) ** 2 + unsteady**2 + risen**2)
     return SinkRate(_onto(-float(fitted[1]), heights, ground, evidence), float(sigma), heights.topic)
 
 
@@ -63,12 +64,12 @@ def _by_speed(heights: Heights, ground: Ground | None, evidence: Evidence) -> Si
     prior = np.diag([0.0, 1.0])
     covariance = np.linalg.inv(design.T @ design / SPEED_NOISE_MPS**2 + prior)
     fitted = covariance @ (design.T @ heights.down_mps[rows]) / SPEED_NOISE_MPS**2
-    speed = _speed(heights, ground, evidence)
-    sigma = np.sqrt(covariance[0, 0] + (fitted[1] * evidence.sigma_s) ** 2 + UNSTEADY_MPS**2 + (UNEVEN * speed) ** 2)
+    risen = UNEVEN * _speed(heights, evidence)
+    sigma = np.sqrt(covariance[0, 0] + (fitted[1] * evidence.sigma_s) ** 2 + UNSTEADY_MPS**2 + risen**2)
     return SinkRate(_onto(float(fitted[0]), heights, ground, evidence), float(sigma), heights.topic)
 
 
-def _speed(heights: Heights, ground: Ground, evidence: Evidence) -> float:
+def _speed(heights: Heights, evidence: Evidence) -> float:
     return float(np.interp(evidence.time_s, heights.time_s, heights.speed_mps))
 
 
@@ -76,7 +77,7 @@ def _onto(down_mps: float, heights: Heights, ground: Ground | None, evidence: Ev
     """Return the sink rate onto a runway that rises; a height above the ground has it already."""
     if ground is None or heights.kind.counts_from_ground:
         return down_mps
-    return down_mps + ground.slope * _speed(heights, ground, evidence)
+    return down_mps + ground.slope * _speed(heights, evidence)
 
 
 def rate_before(time_s: FloatArray, height_m: FloatArray, at_s: float, source: str) -> SinkRate | None:

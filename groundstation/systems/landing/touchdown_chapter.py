@@ -42,7 +42,7 @@ def _facts(one: Approach, down: Touchdown) -> Facts:
     pairs = [
         ("Time", f"{clock(down.time_s)} {_interval(down)}", f"95 %; {by}"),
         ("Place", f"{number(down.latitude_deg, 5, '°')}, {number(down.longitude_deg, 5, '°')}", _along(down)),
-        ("Beyond the threshold", number(down.past_threshold_m, 0, "m"), typeset(one.runway.place_reason)),
+        ("Beyond the threshold", number(down.past_threshold_m, 0, "m"), _beyond(one, down)),
         ("Ground speed", number(down.ground_speed_mps, 1, "m/s"), ""),
         ("Sink rate", with_interval(down.sink_rate_mps, down.sink_rate_sigma_mps), _sink_remark(down)),
         ("Peak normal acceleration", number(down.peak_load_g, 2, "g"), PEAK_TIME),
@@ -69,6 +69,16 @@ def _along(down: Touchdown) -> str:
     if down.place_sigma_m is None:
         return told
     return f"{told}; ± {number(NORMAL_95 * down.place_sigma_m, 0, 'm')} along the runway by the time (95 %)"
+
+
+def _beyond(one: Approach, down: Touchdown) -> str:
+    """Return how a distance as recorded and that of the criterion go together."""
+    if down.past_threshold_m is None:
+        return typeset(one.runway.place_reason)
+    corrected = next((row.value for row in one.criteria if row.name == "touchdown"), None)
+    if corrected is None or round(corrected) == round(down.past_threshold_m):
+        return "as recorded"
+    return f"as recorded; {number(corrected, 0, 'm')} less the error of the positions"
 
 
 def with_interval(value: float | None, sigma: float | None, digits: int = 2, unit: str = "m/s") -> str:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from groundstation.chapters.parts import Section
 from groundstation.results.figures import FigureData
@@ -188,19 +189,19 @@ def _judged(family: TouchdownFamily, runs: int, seed: int) -> dict[str, object]:
             sinks.append((sink.rate_mps - _mean_sink(motion)) / sink.sigma_mps)
             sink_sigmas.append(sink.sigma_mps)
         seconds.append(_second(found, made))
-    share = float(np.mean(held))
+    share = float(np.mean(held)) if held else np.nan
     return {
         "family": family.name,
         "measured": float(len(errors)),
         "coverage": share,
         "coverage_sigma": float(np.sqrt(share * (1.0 - share) / max(len(errors), 1))),
-        "rms_of_error_over_sigma": float(np.sqrt(np.mean(np.square(scaled)))),
-        "median_sigma_s": float(np.median(sigmas)),
-        "median_abs_error_s": float(np.median(np.abs(errors))),
-        "median_error_s": float(np.median(errors)),
-        "phases_abs_error_s": float(np.median(np.abs(guesses))),
+        "rms_of_error_over_sigma": float(np.sqrt(np.mean(np.square(scaled)))) if scaled else np.nan,
+        "median_sigma_s": _median(sigmas),
+        "median_abs_error_s": _median(np.abs(errors)),
+        "median_error_s": _median(errors),
+        "phases_abs_error_s": _median(np.abs(guesses)),
         "sink_coverage": _share(sinks),
-        "median_sink_sigma_mps": float(np.median(sink_sigmas)),
+        "median_sink_sigma_mps": _median(sink_sigmas),
         "second_contact_share": float(np.nanmean(seconds)) if np.isfinite(seconds).any() else float("nan"),
     }
 
@@ -220,6 +221,11 @@ def _second(found: Evidence, made: SimulatedTouchdown) -> float:
     if made.second_contact_s is None:
         return float(bool(told))
     return float(any(abs(one.time_s - made.second_contact_s) < NEAR_S for one in told))
+
+
+def _median(values: ArrayLike) -> float:
+    """Return the median; NaN where nothing was measured."""
+    return float(np.median(np.asarray(values, dtype=np.float64))) if np.size(values) else float("nan")
 
 
 def _share(scaled: list[float]) -> float:

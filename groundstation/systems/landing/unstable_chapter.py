@@ -85,8 +85,8 @@ def _table(found: UnstableApproaches) -> Grid:
 
 def _caution(found: UnstableApproaches) -> str:
     return (
-        "An approach counts as stabilised where no criterion that the log has was left: logs with fewer channels look "
-        "better. Compare runways and aircraft by logs of one kind."
+        "An approach counts as stabilised if it broke none of the criteria that its log has: logs with fewer channels "
+        "look better. Compare runways and aircraft by logs of one kind."
     )
 
 

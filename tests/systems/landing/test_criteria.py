@@ -9,6 +9,7 @@ import pytest
 from groundstation.base.errors import SettingsError
 from groundstation.base.records import Column
 from groundstation.base.toml_settings import settings_from
+from groundstation.chapters.parts import Facts
 from groundstation.simulation.approach import ApproachScenario, FinalMotion, Recorded, TrueRunway, simulate_approach
 from groundstation.systems.known import Known, Runway, SiteData
 from groundstation.systems.landing.analysis import LANDING
@@ -20,6 +21,7 @@ from groundstation.systems.landing.criteria_settings import CriteriaSettings, Li
 from groundstation.systems.landing.settings import LandingSettings
 from groundstation.systems.landing.stabilised import rejudge
 from groundstation.systems.landing.sustained import worst_sustained
+from groundstation.systems.landing.touchdown_chapter import touchdown_parts
 from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight, Table
 
@@ -163,6 +165,20 @@ def test_touchdown_threshold_and_remaining_runway_are_those_flown() -> None:
     assert 2.0 < flare.value < 15.0 and floating.value < flare.value * SECOND_M
 
 
+def test_the_touchdown_tells_its_distance_as_recorded_and_without_the_error_of_the_positions() -> None:
+    one = approach(flown())
+    assert one.touchdown is not None and one.touchdown.past_threshold_m is not None
+    rows = tuple(replace(row, value=100.0) if row.name == "touchdown" else row for row in one.criteria)
+
+    def told(some: Approach) -> str:
+        facts = touchdown_parts(some)[0]
+        assert isinstance(facts, Facts)
+        return next(str(pair[2]) for pair in facts.pairs if pair[0] == "Beyond the threshold")
+
+    assert told(replace(one, criteria=())) == "as recorded"
+    assert "100\u202fm less the error of the positions" in told(replace(one, criteria=rows))
+
+
 def test_nothing_is_said_of_a_threshold_that_the_positions_placed() -> None:
     one = approach(flown(), SiteData())
     found = {name: criterion(one, name) for name in ("touchdown", "runway_remaining", "threshold_height")}
@@ -175,6 +191,16 @@ def test_what_a_log_lacks_is_not_logged() -> None:
     for name in ("thrust", "tailwind", "landing_flap", "landing_pitch", "landing_load"):
         assert criterion(one, name).state == "not logged", name
     assert one.score is None, "no weights of the user"
+    air = criterion(one, "threshold_speed")
+    assert (air.state, air.reason) == ("not logged", "not in the log"), "no airspeed at all"
+
+
+def test_an_airspeed_that_ends_before_the_threshold_is_not_measured_there() -> None:
+    heights_m = heights()
+    speed = np.where(heights_m > 60.0, 70.0, np.nan)
+    one = approach(with_topic(flown(), "air", indicated_airspeed_mps=speed))
+    air = criterion(one, "threshold_speed")
+    assert (air.state, air.reason) == ("not measured", "no indicated airspeed at the threshold")
 
 
 def test_a_go_around_has_criteria_of_the_air_alone() -> None:

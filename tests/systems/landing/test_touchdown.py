@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.chapters.markdown import markdown
 from groundstation.pipeline.api import open_flight
 from groundstation.results.answer import by_analysis
@@ -19,14 +20,15 @@ from groundstation.systems.known import Known
 from groundstation.systems.landing.analysis import LANDING
 from groundstation.systems.landing.answer import Approach, LandingResult
 from groundstation.systems.landing.evidence import Evidence, evidence_of
+from groundstation.systems.landing.finals import _rolls_on
 from groundstation.systems.landing.findings import findings_of
 from groundstation.systems.landing.path import path_of
 from groundstation.systems.landing.second_contact import second_contacts
 from groundstation.systems.landing.settings import LandingSettings
 from groundstation.systems.landing.sink import sink_rate_of
 from groundstation.systems.landing.touchdown_answer import Touchdown, Witness
-from groundstation.systems.landing.touchdown_study import FAMILIES, drawn, study_touchdown
-from groundstation.systems.landing.witnesses import by_wheel_speed
+from groundstation.systems.landing.touchdown_study import FAMILIES, TouchdownFamily, _mean_sink, drawn, study_touchdown
+from groundstation.systems.landing.witnesses import LoadSamples, by_wheel_speed
 from groundstation.tables.phases import PhaseInterval, Phases, flight_phases
 from tests.real_logs import real_log
 from tests.report_example import example
@@ -130,6 +132,15 @@ def test_a_runway_that_rises_or_falls_is_measured_and_moves_nothing(slope: float
     assert sink.rate_mps == pytest.approx(1.3, abs=2.5 * sink.sigma_mps), "onto the runway, not against the horizon"
 
 
+def test_the_sink_rate_by_an_altitude_allows_for_a_runway_that_is_uneven() -> None:
+    channels = replace(NOTHING, load_hz=8.0, has_altitude=True, has_vertical_speed=True, receiver_hz=5.0)
+    kinked = replace(PLAIN, slope=0.03, kink=-0.01)
+    for seed in range(4):
+        found = sink_rate_of(evidence(made(kinked, channels, seed)))
+        assert found is not None and found.sigma_mps is not None and found.topic == "gnss"
+        assert abs(found.rate_mps - _mean_sink(kinked)) < NORMAL_95 * found.sigma_mps
+
+
 def test_a_tail_dragger_gives_no_witness_of_pitch() -> None:
     simulated = made(replace(PLAIN, nose_after_s=None))
     found = evidence(simulated)
@@ -154,6 +165,19 @@ def test_a_bounce_is_a_second_contact_and_a_plain_landing_has_none() -> None:
     assert not second_contacts(evidence(made(channels=channels)))
 
 
+def test_scattered_light_samples_of_a_roll_out_are_no_spell_in_the_air() -> None:
+    found = evidence(made())
+    time_s = np.arange(found.time_s - 30.0, found.time_s + 10.0, 0.125)
+    load_g = np.where(np.arange(len(time_s)) % 4 == 0, 0.93, 1.0)
+    load_g[(time_s >= found.time_s) & (time_s < found.time_s + 0.3)] = 1.4
+    load_g[(time_s >= found.time_s + 4.0) & (time_s < found.time_s + 4.2)] = 1.2
+    rolling = replace(found, load=LoadSamples("ins.accelerometer", time_s, load_g))
+    assert second_contacts(rolling) == ()
+    load_g = np.where((time_s > found.time_s + 2.0) & (time_s < found.time_s + 4.0), 0.9, load_g)
+    (one,) = second_contacts(replace(found, load=LoadSamples("ins.accelerometer", time_s, load_g)))
+    assert one.time_s == pytest.approx(found.time_s + 4.0, abs=0.2)
+
+
 def test_a_touch_and_go_is_one() -> None:
     simulated = made()
     down, again = simulated.contact_s, simulated.contact_s + 8.0
@@ -163,6 +187,13 @@ def test_a_touch_and_go_is_one() -> None:
     )  # fmt: skip
     assert told.outcome == "touch-and-go" and told.touchdown is not None
     assert told.touchdown.time_s == pytest.approx(simulated.contact_s, abs=0.5)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_roll_without_any_speed_is_no_touch_and_go() -> None:
+    path = path_of(made().flight, LandingSettings())
+    silent = replace(path, ground_speed_mps=np.full(len(path.time_s), np.nan))
+    assert _rolls_on(path, 90.0, 92.0) and not _rolls_on(silent, 90.0, 92.0)
 
 
 def test_what_is_set_down_has_no_touchdown() -> None:
@@ -210,6 +241,12 @@ def test_the_study_tells_every_family_and_repeats() -> None:
 
 
 @pytest.mark.slow
+def test_a_family_in_which_nothing_is_measured_is_told_without_a_warning() -> None:
+    deaf = TouchdownFamily("deaf", "no channel", lambda motion, channels, rng: (motion, NOTHING))
+    (figure,) = study_touchdown(1, seed=1, families=(deaf,)).figures
+    assert figure.columns["measured"][0] == 0.0 and np.isnan(figure.columns["coverage"][0])
+
+
 def test_the_interval_holds_what_it_says() -> None:
     data = study_touchdown(100, 9, families=FAMILIES[:1]).tables[0]
     assert data.columns["coverage"][0] >= 0.9  # 95 % less two standard deviations of the share

@@ -90,6 +90,9 @@ def test_standards_are_found_by_name_and_by_kind(tmp_path: Path) -> None:
     found = standard_of(str(path))
     assert found is not None and found[0].kind == "landing"
     path.write_text('kind = "other"\n')
+    with pytest.raises(SettingsError, match=r"mine\.toml, key kind: found 'other', expected 'landing'"):
+        standard_of(str(path))
+    path.write_text('title = "of an INS"\n')
     assert standard_of(str(path)) is None
     assert judge([], SHIPPED.read("fsf-alar")).decision == "no limit"
 
