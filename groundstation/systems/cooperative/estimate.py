@@ -202,7 +202,7 @@ def _vehicle_rows(prepared: Prepared, one: JudgedRun) -> list[VehicleRow]:
     for track, vehicle, judgement in zip(one.run.tracks, prepared.vehicles, one.judgements, strict=True):
         if not len(track.time_s):
             continue
-        state, sigma = track.state[-1], np.sqrt(np.diag(track.covariance[-1]))
+        state, sigma = track.state[-1], np.sqrt(np.diag(track.covariance[-1, :2, :2]))
         rows.append(
             VehicleRow(
                 vehicle=track.name,

@@ -88,7 +88,8 @@ class PairwiseCovariances:
         self.joint.output(who)
         first = self.joint.places[who].start
         real = self.joint.P[first : first + 2, first : first + 2]
-        return float(np.trace(np.linalg.solve(self.claimed[who][:2, :2], real)))
+        claimed = self.claimed[who][:2, :2]
+        return float(np.trace(np.linalg.solve(claimed, real))) if claimed.any() else 2.0  # a start known exactly
 
     def relative_m2(self, one: int, two: int) -> FloatArray:
         """Return the claimed covariance of the place of one vehicle to another, shape (2, 2)."""

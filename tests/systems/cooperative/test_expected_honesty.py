@@ -102,6 +102,19 @@ def test_the_joint_covariance_along_a_run_is_that_of_the_centralised_filter() ->
     assert times == run.tracks[0].time_s.tolist()
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("known", ["position_m", "velocity_mps", "clock_mps", "baro_m"])
+def test_what_is_known_exactly_makes_no_expected_nees_that_is_no_number(known: str) -> None:
+    scenario = replace(scenario_of(Net(3, 2, 10.0)), duration_s=40.0)
+    settings = replace(settings_of(scenario, CASES[0]), map_window_s=0.0, judges_stations=False)
+    settings = replace(settings, pairwise_nees_limit=100.0, ins=replace(settings.ins, **{known: 0.0}))
+    session = simulate_session(scenario, SEED).session
+    answer, _ = estimate_session(session, settings=settings, algorithms=("centralised", "pairwise"))
+    (row,) = (one for one in answer.algorithms if one.algorithm == "pairwise")
+    assert row.refused == "" and row.expected_nees is not None and 1.0 < row.expected_nees < 100.0
+    assert row.two_sigma_r_m is not None and np.isfinite(row.two_sigma_r_m)
+
+
 def test_relative_places_of_two_are_claimed_alike_by_centralised_and_pairwise() -> None:
     prepared, settings = _prepared(scenario_of(Net(2, 0, 20.0)))
     found = {

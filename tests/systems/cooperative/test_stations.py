@@ -8,6 +8,7 @@ import pytest
 
 from groundstation.base.datums import DATUMS
 from groundstation.base.errors import SettingsError
+from groundstation.chapters.parts import Grid
 from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_scenario import load_session
 from groundstation.systems.cooperative.answer import CooperativeResult
@@ -199,7 +200,7 @@ def test_a_station_that_nobody_hears_does_not_fit() -> None:
     assert [row.verdict for row in answer.rows] == ["fits", "fits", "not judged"]
     assert answer.in_doubt == () and station_findings(answer) == ()
     (table, *_) = stations_parts(CooperativeResult("local", "smoothed", (), (), stations=answer))
-    assert table is not None and table.rows[2][3] == ""
+    assert isinstance(table, Grid) and table.rows[2][3] == ""
 
 
 def test_ins_worse_than_believed_is_taken_as_it_is_and_accuses_no_station() -> None:

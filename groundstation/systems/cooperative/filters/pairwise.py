@@ -218,10 +218,17 @@ class Pairwise:
 def after_over_before(after: FloatArray, before: FloatArray) -> FloatArray:
     """Return after @ inverse(before), scaled by the sigmas.
 
-    States differ by eight powers of ten.
+    States differ by eight powers of ten. Those that are known exactly, before and after, have a 0 in it.
+
+    Examples
+    --------
+    >>> after_over_before(np.diag([1.0, 0.0]), np.diag([4.0, 0.0])).tolist()
+    [[0.25, 0.0], [0.0, 0.0]]
     """
-    sigma = np.sqrt(before.diagonal())
+    is_exact = before.diagonal() <= 0.0
+    sigma = np.sqrt(np.where(is_exact, 1.0, before.diagonal()))
     normal = before / np.multiply.outer(sigma, sigma)
+    normal[is_exact, is_exact] = 1.0
     return np.asarray(np.linalg.solve(normal, (after / sigma).T).T / sigma)
 
 
