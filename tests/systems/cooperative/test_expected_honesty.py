@@ -15,7 +15,7 @@ from groundstation.systems.cooperative.events import Prepared, prepare
 from groundstation.systems.cooperative.expected_honesty import expected_nees
 from groundstation.systems.cooperative.joint_covariance import joint_covariances
 from groundstation.systems.cooperative.relative import relative_covariances
-from groundstation.systems.cooperative.settings import CooperativeSettings
+from groundstation.systems.cooperative.settings import CooperativeSettings, InsBelief
 from groundstation.systems.cooperative.study.cases import CASES, settings_of
 from groundstation.systems.cooperative.study.pairwise_family import Net, pairwise_table, scenario_of
 
@@ -107,7 +107,8 @@ def test_the_joint_covariance_along_a_run_is_that_of_the_centralised_filter() ->
 def test_what_is_known_exactly_makes_no_expected_nees_that_is_no_number(known: str) -> None:
     scenario = replace(scenario_of(Net(3, 2, 10.0)), duration_s=40.0)
     settings = replace(settings_of(scenario, CASES[0]), map_window_s=0.0, judges_stations=False)
-    settings = replace(settings, pairwise_nees_limit=100.0, ins=replace(settings.ins, **{known: 0.0}))
+    ins = InsBelief(**{**vars(settings.ins), known: 0.0})
+    settings = replace(settings, pairwise_nees_limit=100.0, ins=ins)
     session = simulate_session(scenario, SEED).session
     answer, _ = estimate_session(session, settings=settings, algorithms=("centralised", "pairwise"))
     (row,) = (one for one in answer.algorithms if one.algorithm == "pairwise")

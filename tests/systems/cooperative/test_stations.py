@@ -10,12 +10,12 @@ from groundstation.base.datums import DATUMS
 from groundstation.base.errors import SettingsError
 from groundstation.chapters.parts import Grid
 from groundstation.simulation.session import simulate_session
-from groundstation.simulation.session_scenario import load_session
+from groundstation.simulation.session_scenario import SessionPoint, load_session
 from groundstation.systems.cooperative.answer import CooperativeResult
 from groundstation.systems.cooperative.estimate import estimate_session
 from groundstation.systems.cooperative.events import prepare
 from groundstation.systems.cooperative.smoother.smoothed import run_smoothed
-from groundstation.systems.cooperative.stations import response
+from groundstation.systems.cooperative.stations import hypotheses, response
 from groundstation.systems.cooperative.stations.hypotheses import FOUND, chance_of, noncentrality
 from groundstation.systems.cooperative.stations.information import EACH, station_information
 from groundstation.systems.cooperative.stations.judge import StationJudgement, judge_stations, survey_of
@@ -201,6 +201,19 @@ def test_a_station_that_nobody_hears_does_not_fit() -> None:
     assert answer.in_doubt == () and station_findings(answer) == ()
     (table, *_) = stations_parts(CooperativeResult("local", "smoothed", (), (), stations=answer))
     assert isinstance(table, Grid) and table.rows[2][3] == ""
+
+
+def test_no_station_that_is_refused_fits_however_many_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hypotheses, "CANNOT_TELL", 1e-9)  # each round puts one station in doubt
+    points = tuple(SessionPoint(f"P{i}", 60e3 * np.cos(i), 60e3 * np.sin(i)) for i in range(5))
+    case = replace(BY_NAME["two-right"], points=points)
+    scenario = replace(case.scenario(), duration_s=30.0)
+    session = simulate_session(scenario, SEED).session
+    for station in range(5):
+        session = moved(session, station, 400.0 * np.cos(2.4 * station), 400.0 * np.sin(2.4 * station))
+    answer = stations_answer(judge_stations(session, case.settings()), session, session.names)
+    assert [row.station for row in answer.rows if row.chance < 0.001 and row.verdict == "fits"] == []
+    assert len(answer.in_doubt) >= 5
 
 
 def test_ins_worse_than_believed_is_taken_as_it_is_and_accuses_no_station() -> None:

@@ -33,7 +33,7 @@ from groundstation.systems.cooperative.stations.hypotheses import (
 from groundstation.systems.cooperative.stations.information import EACH, StationInformation, station_information
 from groundstation.tables.session import GroundPoint, Session
 
-MOST_ROUNDS, BELIEF_ROUNDS, DELAY_ROUNDS = 4, 2, 2
+BELIEF_ROUNDS, DELAY_ROUNDS = 2, 2
 Solved = tuple[StationInformation, SmoothedProblem, Prepared]
 FREE = 5.0  # sigmas of a free place, in sizes of the error found
 DATUM_TOLD = 12.0  # twice the log of the likelihood ratio of a datum from which it is told
@@ -170,7 +170,7 @@ def judge_stations(session: Session, settings: CooperativeSettings) -> StationJu
         now = _in_datum(session, told.name)
         information, solved, _ = station_information(now, raised)
         found = tests = station_tests(information, range(len(session.points)))
-    for number in range(MOST_ROUNDS):
+    for number in range(len(session.points)):  # each puts one or more in doubt
         if not alarms(found):
             break
         fresh = [_placed(doubt, now, raised) for doubt in _doubts(found, number)]
