@@ -82,7 +82,7 @@ def respond(problem: Problem, columns: FloatArray) -> Response:
 
 
 def _backwards(problem: Problem, residual: FloatArray) -> Iterator[tuple[int, FloatArray, FloatArray]]:
-    """Yield the knots from the last to the first with the covariance after their rows and what these tell.
+    """Yield the knots from the last to the first, with covariances and what their rows tell.
 
     What a pass keeps is bounded: beyond it, pieces are passed again.
     """
