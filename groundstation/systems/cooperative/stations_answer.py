@@ -46,7 +46,7 @@ class StationRow:
     stated_sigma_m, used_sigma_m : float
         Sigma of its place as stated, and as the answer takes it.
     survey_north_m, survey_east_m, survey_sigma_north_m, survey_sigma_east_m : float or None
-        Where the answer puts it, off its place in the file, and the sigmas; where its place is not taken as exact.
+        Where the answer puts it, off its place in the file, and the sigmas; None where it takes that place as exact.
     """
 
     station: str

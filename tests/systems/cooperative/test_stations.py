@@ -203,6 +203,17 @@ def test_a_station_that_nobody_hears_does_not_fit() -> None:
     assert isinstance(table, Grid) and table.rows[2][3] == ""
 
 
+def test_stations_in_another_datum_are_told_where_the_answer_puts_them() -> None:
+    case = BY_NAME["two-datum"]
+    _, session, wrong = drawn(case, SEED, 0)
+    answer = stations_answer(judge_stations(session, case.settings()), session, session.names)
+    for station, row in enumerate(answer.rows):
+        assert (row.used_sigma_m, row.survey_sigma_north_m) == (0.0, 0.0)
+        assert [row.survey_north_m, row.survey_east_m] == pytest.approx(
+            (-wrong[station]).tolist(), abs=3.0
+        )  # SK-95 is told as well
+
+
 def test_no_station_that_is_refused_fits_however_many_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hypotheses, "CANNOT_TELL", 1e-9)  # each round puts one station in doubt
     points = tuple(SessionPoint(f"P{i}", 60e3 * np.cos(i), 60e3 * np.sin(i)) for i in range(5))

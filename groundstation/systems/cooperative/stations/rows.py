@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from groundstation.base.angles import wrap_360
+from groundstation.base.angles import FloatArray, wrap_360
+from groundstation.base.ecef import ecef_from_n, geodetic_deg_m
 from groundstation.base.findings import Finding
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.systems.cooperative.aircraft import Aircraft
@@ -133,8 +134,7 @@ def _row(judgement: StationJudgement, session: Session, station: int, vehicles: 
     delay = next((test for kind, test in tests.items() if kind != SHIFT), None)
     best, worst = judgement.detectable_m(station)
     moves, whose = judgement.metres_per_metre(station)
-    survey = None if doubt is not None and doubt.left_out else survey_of(judgement, station)
-    place, sigma = survey if survey is not None else (None, None)
+    place, sigma = _surveyed(judgement, session, station)
     return StationRow(
         station=session.points[station].name,
         verdict=_verdict(judgement, station),
@@ -156,6 +156,26 @@ def _row(judgement: StationJudgement, session: Session, station: int, vehicles: 
         survey_sigma_north_m=None if sigma is None else float(sigma[0]),
         survey_sigma_east_m=None if sigma is None else float(sigma[1]),
     )
+
+
+def _surveyed(
+    judgement: StationJudgement, session: Session, station: int
+) -> tuple[FloatArray, FloatArray] | tuple[None, None]:
+    """Return where the answer puts a station (north, east), off its place in the file, and the sigmas.
+
+    In another datum its place is another one, be it exact there.
+    """
+    doubt = next((one for one in judgement.doubts if one.station == station), None)
+    if doubt is not None and doubt.left_out:
+        return None, None
+    at = np.array(session.points[station].position_m)
+    by_datum = np.array(judgement.session.points[station].position_m) - at
+    survey = survey_of(judgement, station)
+    if survey is None and not by_datum.any():
+        return None, None
+    axes = np.eye(3) if session.frame == "local" else ecef_from_n(*geodetic_deg_m(at)[:2])
+    place, sigma = survey if survey is not None else (np.zeros(2), np.zeros(2))
+    return (axes.T @ by_datum)[:2] + place, sigma
 
 
 def _verdict(judgement: StationJudgement, station: int) -> StationVerdict:
