@@ -135,7 +135,7 @@ def _from_above(one: Approach, own: LandingPath) -> Panel:
         place = [int(np.argmin(np.abs(own.time_s - one.touchdown.time_s)))]
         marks.append(Points(x=distance[place], y=across[place], role="gnss", name="touchdown"))
     reach = max(1.3 * float(np.nanmax(np.abs(across))), 0.3)
-    return Panel(marks, _distance(own), Axis("right of the course, km", low=-reach, high=reach))
+    return Panel(marks, _distance(own), Axis("right of it, km", low=-reach, high=reach))
 
 
 def _from_the_side(one: Approach, own: LandingPath) -> Panel:
