@@ -85,7 +85,7 @@ def test_a_session_is_run_again_with_other_settings(session: Path, tmp_path: Pat
     assert {"cooperative.ins.position_m"} <= {pair.name for pair in found.settings}
     assert called("compare", session, again, "-o", tmp_path / "c") == 0
     html = (tmp_path / "c" / "compare.html").read_text(encoding="utf-8")
-    assert "Both come from the same logs" in html and html.count("<svg") == 2
+    assert "Both come from the same logs" in html and html.count("<svg") == 4  # each curve with its difference
     entities = Contents(tmp_path / "c" / "compare.rrd").batches
     drawn = {f"/comparison/session_errors-{name}" for name in ("two_sigma_r_m", "rms_error_m")}
     assert all(any(entity.startswith(one) for entity in entities) for one in drawn), entities

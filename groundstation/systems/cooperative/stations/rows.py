@@ -161,9 +161,9 @@ def _row(judgement: StationJudgement, session: Session, station: int, vehicles: 
 def _surveyed(
     judgement: StationJudgement, session: Session, station: int
 ) -> tuple[FloatArray, FloatArray] | tuple[None, None]:
-    """Return where the answer puts a station (north, east), off its place in the file, and the sigmas.
+    """Return how far off its place in the file the answer puts a station, and the sigmas.
 
-    In another datum its place is another one, be it exact there.
+    North and east. In another datum its place is another one, be it exact there.
     """
     doubt = next((one for one in judgement.doubts if one.station == station), None)
     if doubt is not None and doubt.left_out:
