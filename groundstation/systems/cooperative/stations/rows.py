@@ -161,7 +161,7 @@ def _row(judgement: StationJudgement, session: Session, station: int, vehicles: 
 def _surveyed(
     judgement: StationJudgement, session: Session, station: int
 ) -> tuple[FloatArray, FloatArray] | tuple[None, None]:
-    """Return where the answer puts a station (north, east), off its place in the file, and the sigmas.
+    """Return where the answer puts a station, north and east off the file, and the sigmas.
 
     In another datum its place is another one, be it exact there.
     """
