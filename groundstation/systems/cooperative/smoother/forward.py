@@ -155,14 +155,13 @@ class _Pass:
     def _count(self, passes: BoolArray, part: slice, knot: int) -> None:
         """Count rejections of each vehicle in a row."""
         receivers, sources = self._receiver[part], self._source[part]
-        kinds = self._rows.kind[part]
+        tells = self._rows.kind[part] != HEIGHT  # a height tells nothing of a clock or a place
+        passes, receivers, sources = passes[tells], receivers[tells], sources[tells]
         if passes.all():
             self._rejected[receivers] = 0
             self._rejected[sources[sources >= 0]] = 0
             return
-        for passed, receiver, source, kind in zip(
-            passes.tolist(), receivers.tolist(), sources.tolist(), kinds.tolist(), strict=True
-        ):
+        for passed, receiver, source in zip(passes.tolist(), receivers.tolist(), sources.tolist(), strict=True):
             for who in (receiver, source) if source >= 0 else (receiver,):
                 if passed:
                     self._rejected[who] = 0
@@ -170,6 +169,6 @@ class _Pass:
                 if not self._rejected[who]:
                     self._since[who] = knot
                 self._rejected[who] += 1
-                if self._rejected[who] >= PATIENCE and kind != HEIGHT:
+                if self._rejected[who] >= PATIENCE:
                     self._rejected[who] = 0
                     self._found.append((int(self._since[who]), who))
