@@ -9,6 +9,7 @@ from groundstation.pipeline.one_flight.log import log_name
 from groundstation.pipeline.one_flight.outcome import Outcome, State
 from groundstation.pipeline.one_flight.progress import Event
 
+MOST_NAMED = 4  # logs of a session
 LONGEST = 160  # characters of a line behind the name of the log
 STATES: Mapping[State, str] = {"data_lost": "data lost", "limit_reached": "at the limit", "incomplete": "incomplete"}
 GRADES: Mapping[str, str] = {
@@ -86,8 +87,17 @@ class Lines:
 
 
 def name_of(outcome: Outcome) -> str:
-    """Return the name of a log, or of the logs of a session."""
-    return outcome.source if outcome.is_session else log_name(Path(outcome.source))
+    """Return the name of a log, or of the logs of a session.
+
+    Examples
+    --------
+    >>> name_of(Outcome("a/b.csv", "done", "")), name_of(Outcome("a, b, c, d, e", "done", "", is_session=True))
+    ('b.csv', 'a and 4 other logs')
+    """
+    if not outcome.is_session:
+        return log_name(Path(outcome.source))
+    names = outcome.source.split(", ")
+    return outcome.source if len(names) <= MOST_NAMED else f"{names[0]} and {len(names) - 1} other logs"
 
 
 def line_of(outcome: Outcome, most: int | None = LONGEST) -> str:
