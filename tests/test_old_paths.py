@@ -1,6 +1,7 @@
 """Old paths of modules answer for one release, each with a warning that names the new one."""
 
 import importlib
+import sys
 from importlib.util import find_spec
 
 import pytest
@@ -8,15 +9,17 @@ import pytest
 from groundstation.base.old_paths import FILES, FOLDERS, new_path
 
 
-def test_what_was_imported_is_the_same_object() -> None:
+def test_what_was_imported_is_the_same_object(monkeypatch: pytest.MonkeyPatch) -> None:
     from groundstation.systems.heading.answer import HeadingResult
 
+    monkeypatch.delitem(sys.modules, "groundstation.results.heading", raising=False)  # another test may have asked
     with pytest.warns(DeprecationWarning, match=r"results\.heading is now groundstation\.systems\.heading"):
         old = importlib.import_module("groundstation.results.heading")
     assert old.HeadingResult is HeadingResult
 
 
-def test_a_module_in_a_folder_that_moved_is_found() -> None:
+def test_a_module_in_a_folder_that_moved_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "groundstation.estimators.latency.estimate", raising=False)
     with pytest.warns(DeprecationWarning, match=r"now groundstation\.systems\.latency\.estimate"):
         old = importlib.import_module("groundstation.estimators.latency.estimate")
     assert (
