@@ -412,7 +412,7 @@ def test_the_table_of_the_study_counts_what_is_inside() -> None:
 def test_sigma_covers_the_truth_where_nothing_breaks_it() -> None:
     """20 flights a cell of the family, seeds 1 to 20."""
     for cell in CELLS:
-        if cell in ("load", "two legs"):
+        if cell.endswith("load") or cell == "two legs":  # a load that changes in flight is the broken assumption
             continue
         runs = [fly_and_judge(cell, seed) for seed in range(1, 21)]
         ratios = np.array([value for one in runs for value in one.ratios.values()])
