@@ -1,7 +1,7 @@
 """Results of studies: tables, and a page of sections, told as those of a report are."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
@@ -12,6 +12,15 @@ from groundstation.chapters.parts import Grid, Head, Note, Part, Section
 from groundstation.results.figures import FigureData
 
 OutcomeT = TypeVar("OutcomeT")
+FamilyT = TypeVar("FamilyT", bound="Named")
+Row = Mapping[str, object]
+
+
+class Named(Protocol):
+    """Family or case of a study."""
+
+    @property
+    def name(self) -> str: ...
 
 
 class RunStore(Protocol[OutcomeT]):
@@ -22,6 +31,37 @@ class RunStore(Protocol[OutcomeT]):
 
     def put(self, name: str, number: int, outcome: OutcomeT) -> None:
         """Keep the outcome of a run."""
+
+
+def judged_families(
+    families: Sequence[FamilyT],
+    judge: Callable[[FamilyT], Row],
+    progress: Callable[[str], None] | None,
+    told: Callable[[Row], str],
+) -> list[Row]:
+    """Return a row of each family, and tell of each as it is judged."""
+    rows = []
+    for family in families:
+        rows.append(judge(family))
+        if progress:
+            progress(f"{family.name}: {told(rows[-1])}")
+    return rows
+
+
+def table_of(name: str, rows: Sequence[Row], digits: Mapping[str, int]) -> FigureData:
+    """Return rows with the same keys as the columns of a table; there is at least one."""
+    return FigureData(name, {key: np.array([row[key] for row in rows]) for key in rows[0]}, digits)
+
+
+def share_inside(scaled: Sequence[float], sigmas: float) -> float:
+    """Return the share of errors, each over its sigma, within so many sigmas; NaN without any.
+
+    Examples
+    --------
+    >>> share_inside([0.5, -3.0], 1.96), share_inside([], 1.96)
+    (0.5, nan)
+    """
+    return float(np.mean(np.abs(scaled) <= sigmas)) if scaled else float("nan")
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,6 @@ import numpy as np
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.base.runways.table import END_SIGMA_M, SHIFT_SIGMA_M, THRESHOLD_SIGMA_M, RunwayTable
-from groundstation.results.figures import FigureData
 from groundstation.results.landing_categories import LINEAR_95
 from groundstation.simulation.approach import ApproachScenario, simulate_approach
 from groundstation.systems.known import Known
@@ -23,7 +22,7 @@ from groundstation.systems.landing.analysis import LANDING
 from groundstation.systems.landing.answer import AlongError, Approach
 from groundstation.systems.landing.settings import LandingSettings
 from groundstation.systems.landing.study import drawn
-from groundstation.systems.study import StudyResult, section, table
+from groundstation.systems.study import StudyResult, judged_families, section, share_inside, table, table_of
 from groundstation.tables.phases import flight_phases
 
 Progress = Callable[[str], None]
@@ -90,12 +89,13 @@ def study_along(
         Called with one line for each family.
     families : tuple of AlongFamily
     """
-    rows = []
-    for family in families:
-        rows.append(_judged(family, runs, seed))
-        if progress:
-            progress(f"{family.name}: {rows[-1]['measured']:.0f} of {runs} measured")
-    data = FigureData("along_coverage", {name: np.array([row[name] for row in rows]) for name in rows[0]}, DIGITS)
+    rows = judged_families(
+        families,
+        lambda one: _judged(one, runs, seed),
+        progress,
+        lambda row: f"{row['measured']:.0f} of {runs} measured",
+    )
+    data = table_of("along_coverage", rows, DIGITS)
     head = section(
         "Study: the glide path as a reference along the course",
         f"{runs} approaches of each family (seed {seed}), each through phases and analysis, with a runway of the "
@@ -186,7 +186,7 @@ def _judged(family: AlongFamily, runs: int, seed: int) -> dict[str, object]:
         beside = one.position_errors[-1]
         if beside.error_m is not None and beside.sigma_m is not None:
             across.append((beside.error_m - scenario.recorded.across_m) / beside.sigma_m)
-    share = _share(scaled)
+    share = share_inside(scaled, LINEAR_95)
     return {
         "family": family.name,
         "measured": float(len(errors)),
@@ -195,9 +195,5 @@ def _judged(family: AlongFamily, runs: int, seed: int) -> dict[str, object]:
         "rms_of_error_over_sigma": float(np.sqrt(np.mean(np.square(scaled)))) if scaled else np.nan,
         "median_half_width_m": float(np.median(halves)) if halves else np.nan,
         "median_abs_error_m": float(np.median(np.abs(errors))) if errors else np.nan,
-        "across_coverage": _share(across),
+        "across_coverage": share_inside(across, LINEAR_95),
     }
-
-
-def _share(scaled: list[float]) -> float:
-    return float(np.mean(np.abs(scaled) <= LINEAR_95)) if scaled else float("nan")

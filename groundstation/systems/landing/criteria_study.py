@@ -14,7 +14,6 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
 from groundstation.methods.intervals import wilson_interval
-from groundstation.results.figures import FigureData
 from groundstation.simulation.approach import (
     ApproachScenario,
     FinalMotion,
@@ -26,7 +25,7 @@ from groundstation.systems.known import Known, Runway, SiteData
 from groundstation.systems.landing.analysis import LANDING
 from groundstation.systems.landing.answer import Approach
 from groundstation.systems.landing.settings import LandingSettings
-from groundstation.systems.study import StudyResult, section, table
+from groundstation.systems.study import StudyResult, section, table, table_of
 from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight, Table
 
@@ -96,7 +95,7 @@ def study_criteria(
         rows += [_row(family.name, name, counts) for name in NAMES]
         if progress:
             progress(f"{family.name}: {sum(counts[name, 'wrong'] for name in NAMES)} wrong verdicts")
-    data = FigureData("landing_criteria", {key: np.array([row[key] for row in rows]) for key in rows[0]}, DIGITS)
+    data = table_of("landing_criteria", rows, DIGITS)
     page = section(
         "Study: the criteria of an approach",
         f"{runs} approaches of each family of docs/approaches.md (seed {seed}), through phases and analysis. Share "

@@ -16,10 +16,9 @@ import numpy as np
 from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.base.runways.kept import shipped_runways
 from groundstation.base.runways.table import RunwayDirection, RunwayTable
-from groundstation.results.figures import FigureData
 from groundstation.systems.landing.runway_choice import EndOfApproach, choose_runway
 from groundstation.systems.landing.settings import LandingSettings
-from groundstation.systems.study import StudyResult, section, table
+from groundstation.systems.study import StudyResult, judged_families, section, table, table_of
 
 Progress = Callable[[str], None]
 ASSUMED = LandingSettings()
@@ -101,13 +100,14 @@ def study_runways(
         Called with one line for each family.
     families : tuple of ChoiceFamily
     """
-    shipped, rows = shipped_runways(), []
-    for family in families:
-        rows.append(_judged(family, shipped, runs, seed))
-        if progress:
-            progress(f"{family.name}: {rows[-1]['decided']:.2f} decided")
-    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    data = FigureData("runway_choice", columns, DIGITS)
+    shipped = shipped_runways()
+    rows = judged_families(
+        families,
+        lambda one: _judged(one, shipped, runs, seed),
+        progress,
+        lambda row: f"{row['decided']:.2f} decided",
+    )
+    data = table_of("runway_choice", rows, DIGITS)
     head = section(
         "Study: the choice of the runway from the table",
         f"{runs} ends of approaches of each family (seed {seed}), {shipped.version}. Right: of the decided ones, the "

@@ -28,7 +28,7 @@ from groundstation.systems.known import Known, Runway, SiteData
 from groundstation.systems.landing.analysis import LANDING
 from groundstation.systems.landing.answer import PositionError
 from groundstation.systems.landing.settings import LandingSettings
-from groundstation.systems.study import StudyResult, section, table
+from groundstation.systems.study import StudyResult, judged_families, section, share_inside, table, table_of
 from groundstation.tables.phases import flight_phases
 
 Progress = Callable[[str], None]
@@ -109,13 +109,13 @@ def study_approach(
         Called with one line for each family.
     families : tuple of ApproachFamily
     """
-    rows = []
-    for family in families:
-        rows.append(_judged(family, runs, seed))
-        if progress:
-            progress(f"{family.name}: {rows[-1]['measured']:.0f} of {runs} measured")
-    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    table = FigureData("approach_coverage", columns, DIGITS)
+    rows = judged_families(
+        families,
+        lambda one: _judged(one, runs, seed),
+        progress,
+        lambda row: f"{row['measured']:.0f} of {runs} measured",
+    )
+    table = table_of("approach_coverage", rows, DIGITS)
     return StudyResult("approach", (table,), _page(table, families, runs, seed))
 
 
@@ -206,7 +206,7 @@ def _judged(family: ApproachFamily, runs: int, seed: int) -> dict[str, object]:
             rolled.append((found.rollout_error_m - there) / found.rollout_sigma_m)
         if found.change_m is not None and found.change_sigma_m is not None:
             changes.append(found.change_m / found.change_sigma_m)
-    share = _share(scaled)
+    share = share_inside(scaled, LINEAR_95)
     held = int(np.sum(np.abs(scaled) <= LINEAR_95)) if scaled else 0
     low, high = share_interval(held, len(scaled)) if scaled else (np.nan, np.nan)
     return {
@@ -218,17 +218,13 @@ def _judged(family: ApproachFamily, runs: int, seed: int) -> dict[str, object]:
         "rms_of_error_over_sigma": float(np.sqrt(np.mean(np.square(scaled)))) if scaled else np.nan,
         "median_half_width_m": float(np.median(halves)) if halves else np.nan,
         "median_abs_error_m": float(np.median(np.abs(errors))) if errors else np.nan,
-        "rate_coverage": _share(rates),
-        "roll_out_coverage": _share(rolled),
-        "change_coverage": _share(changes),
+        "rate_coverage": share_inside(rates, LINEAR_95),
+        "roll_out_coverage": share_inside(rolled, LINEAR_95),
+        "change_coverage": share_inside(changes, LINEAR_95),
     }
 
 
 ROLL_OUT_AFTER_S = 25.0  # the middle of the roll-out after the threshold: what it differs by is below its sigma
-
-
-def _share(scaled: list[float]) -> float:
-    return float(np.mean(np.abs(scaled) <= LINEAR_95)) if scaled else float("nan")
 
 
 def _page(data: FigureData, families: tuple[ApproachFamily, ...], runs: int, seed: int) -> tuple[Section, ...]:

@@ -22,7 +22,7 @@ from groundstation.systems.landing.path import path_of
 from groundstation.systems.landing.second_contact import second_contacts
 from groundstation.systems.landing.settings import LandingSettings
 from groundstation.systems.landing.sink import sink_rate_of
-from groundstation.systems.study import StudyResult, section, table
+from groundstation.systems.study import StudyResult, judged_families, section, share_inside, table, table_of
 
 Progress = Callable[[str], None]
 MISSING = 0.35  # probability that a log lacks a channel
@@ -110,13 +110,13 @@ def study_touchdown(
         Called with one line for each family.
     families : tuple of TouchdownFamily
     """
-    rows = []
-    for family in families:
-        rows.append(_judged(family, runs, seed))
-        if progress:
-            progress(f"{family.name}: {rows[-1]['measured']:.0f} of {runs} measured")
-    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    found = FigureData("touchdown_coverage", columns, DIGITS)
+    rows = judged_families(
+        families,
+        lambda one: _judged(one, runs, seed),
+        progress,
+        lambda row: f"{row['measured']:.0f} of {runs} measured",
+    )
+    found = table_of("touchdown_coverage", rows, DIGITS)
     return StudyResult("touchdown", (found,), _page(found, families, runs, seed))
 
 
@@ -200,7 +200,7 @@ def _judged(family: TouchdownFamily, runs: int, seed: int) -> dict[str, object]:
         "median_abs_error_s": _median(np.abs(errors)),
         "median_error_s": _median(errors),
         "phases_abs_error_s": _median(np.abs(guesses)),
-        "sink_coverage": _share(sinks),
+        "sink_coverage": share_inside(sinks, 1.96),
         "median_sink_sigma_mps": _median(sink_sigmas),
         "second_contact_share": float(np.nanmean(seconds)) if np.isfinite(seconds).any() else float("nan"),
     }
@@ -226,10 +226,6 @@ def _second(found: Evidence, made: SimulatedTouchdown) -> float:
 def _median(values: ArrayLike) -> float:
     """Return the median; NaN where nothing was measured."""
     return float(np.median(np.asarray(values, dtype=np.float64))) if np.size(values) else float("nan")
-
-
-def _share(scaled: list[float]) -> float:
-    return float(np.mean(np.abs(scaled) <= 1.96)) if scaled else float("nan")
 
 
 def _page(data: FigureData, families: tuple[TouchdownFamily, ...], runs: int, seed: int) -> tuple[Section, ...]:

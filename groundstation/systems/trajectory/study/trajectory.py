@@ -10,7 +10,7 @@ import numpy as np
 
 from groundstation.chapters.parts import Section
 from groundstation.results.figures import FigureData
-from groundstation.systems.study import StudyResult, section, table
+from groundstation.systems.study import StudyResult, section, table, table_of
 from groundstation.systems.trajectory.study.family import FAMILIES, StudyFamily
 from groundstation.systems.trajectory.study.judged import QUANTITIES, Run, run_of
 
@@ -50,8 +50,7 @@ def study_trajectory(
         rows.append(row_of(family.name, found))
         if progress:
             progress(f"{family.name}: {sum(one is not None for one in found)} of {runs} estimated")
-    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    data = FigureData("trajectory_consistency", columns, DIGITS)
+    data = table_of("trajectory_consistency", rows, DIGITS)
     return StudyResult("trajectory", (data,), _page(data, families, runs, seed))
 
 
