@@ -10,7 +10,7 @@ HERE = Path(__file__).parent
 DOCS, ROOT = HERE.parent, HERE.parent.parent
 BUILD = ROOT / "build" / "site"
 GROUP = re.compile(r"^\*\*(?P<title>[^*]+)\*\*(?P<links>.*\(.*\.md\).*)$", re.MULTILINE)
-LINK = re.compile(r"\[([^\]]+)\]\(([\w-]+\.md)\)")
+LINK = re.compile(r"\[([^\]]+)\]\(([\w/-]+\.md)\)")
 OUTSIDE = re.compile(r"\[([^\]]+)\]\((\.\./(?!images)[^)]*|decisions/|notebooks/[^)]*)\)")
 
 

@@ -48,7 +48,7 @@ ORDINARY_RECEIVER = GnssErrorModel(
     velocity_white_mps=0.03,
     velocity_correlated_mps=0.02,
     velocity_correlation_s=60.0,
-)  # docs/forecast-family.md
+)  # docs/evidence/forecast.md
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Taxi runs before take-off: heading, GNSS velocity and the truth.
 
-They are of the family of docs/heading-family.md.
+They are of the family of docs/evidence/heading.md.
 """
 
 from collections.abc import Mapping
@@ -41,7 +41,7 @@ START_OF_DAY_NS = 1_777_874_400 * NS_PER_S  # 2026-05-04T06:00:00Z
 class TaxiCase:
     """Parameters of one simulated taxi run.
 
-    docs/heading-family.md tells what each is and how it is drawn. Times are in seconds, angles in degrees, speeds in
+    docs/evidence/heading.md tells what each is and how it is drawn. Times are in seconds, angles in degrees, speeds in
     m/s, ``drift_deg_per_h`` in degrees an hour. ``segments_s`` are the lengths above 6 m/s, ``turns_deg`` (one fewer)
     the turns between them, ``curve_dps`` the rate of a gentle 10-s curve in the longest segment (0: none).
     """
@@ -151,7 +151,7 @@ def draw_run(family: Family, seed: int, number: int) -> "TaxiRun":
 
 
 def draw_case(rng: np.random.Generator, family: Family) -> TaxiCase:
-    """Draw the parameters of one run from a family of docs/heading-family.md, undisturbed."""
+    """Draw the parameters of one run from a family of docs/evidence/heading.md, undisturbed."""
     grid = family == "grid"
     if grid:
         total_s = float(rng.choice([20.0, 40.0, 60.0, 90.0, 120.0]))

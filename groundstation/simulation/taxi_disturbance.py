@@ -1,6 +1,6 @@
 """Disturbances of airframe, INS and GNSS on taxi, drawn one kind at a time.
 
-The first family of taxi runs leaves them out. docs/heading-family.md tells the second family in words; :data:`KINDS`
+The first family of taxi runs leaves them out. docs/evidence/heading.md tells the second family in words; :data:`KINDS`
 are its cells.
 """
 

@@ -1,6 +1,6 @@
 """Family of flights that the comparison of several units is judged on.
 
-It is written down in docs/units-family.md.
+It is written down in docs/evidence/units.md.
 """
 
 from collections.abc import Callable, Mapping

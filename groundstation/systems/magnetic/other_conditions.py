@@ -29,7 +29,7 @@ PLACE_SIGMA_NT = 60.0  # of the field on the ground against that of the figure: 
 TELLING_SIGMAS = 2.0
 LEAST_SPAN_H = 0.05
 # Twice a correlation time of the wander of roll and pitch: over a longer flight it averages out. 120 s is that of the
-# plain family (docs/magnetic-family.md); FIGURE_WANDER_S takes another time for the same wander.
+# plain family (docs/evidence/magnetic.md); FIGURE_WANDER_S takes another time for the same wander.
 FLIGHT_WANDER_S = 240.0
 PITCH_STEP_DEG = 1.0
 

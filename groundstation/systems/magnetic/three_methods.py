@@ -32,7 +32,8 @@ NO_CIRCULAR = (
 WANDER_IN_A_TO_E = np.array([0.3, 1.0, 1.0, 0.3, 0.3])  # what wanders with the turn rate goes into A, D, E
 WANDER_FREEDOM = 4.0  # what the settings say of the wander counts as so many stretches
 # Twice a correlation time of the wander of roll and pitch: over a longer figure it averages out as the inverse. 250 s
-# lies between the 120 and the 400 s of docs/magnetic-family.md; FLIGHT_WANDER_S takes another time for the same wander.
+# lies between the 120 and the 400 s of docs/evidence/magnetic.md; FLIGHT_WANDER_S takes another time for the same
+# wander.
 FIGURE_WANDER_S = 500.0
 TELLING_SIGMAS = 2.0  # held-out errors that differ by less may do so by chance
 FORECAST_BANKS_DEG = (10.0, 20.0, 30.0)

@@ -213,7 +213,7 @@ def test_mixture_quantile_of_unequal_normals() -> None:
 
 
 def test_priors_are_broader_than_the_family() -> None:
-    """Two sigma of every prior reach beyond what docs/heading-family.md draws."""
+    """Two sigma of every prior reach beyond what docs/evidence/heading.md draws."""
     family = {
         "white_mps": (0.03, 0.07),
         "correlated_mps": (0.02, 0.05),

@@ -1,4 +1,4 @@
-"""Study of the heading verdict on the family crew of docs/heading-family.md.
+"""Study of the heading verdict on the family crew of docs/evidence/heading.md.
 
 Acceptance, coverage, both numbers.
 """
@@ -177,7 +177,7 @@ def study_crew(
     kept: RunStore[CrewOutcome] | None = None,
     minutes: float | None = None,
 ) -> StudyResult:
-    """Run the estimator over the third family of docs/heading-family.md.
+    """Run the estimator over the third family of docs/evidence/heading.md.
 
     So many runs of each kind, by turns.
 
@@ -211,7 +211,7 @@ def study_crew(
             outcomes.append(outcome)
     found = crew_table(outcomes), gates_table(outcomes)
     text = (
-        f"{len(outcomes)} runs of family crew of docs/heading-family.md (seed {seed}), each through tables and "
+        f"{len(outcomes)} runs of family crew of docs/evidence/heading.md (seed {seed}), each through tables and "
         "estimator. Coverage is the share of runs whose 95 % interval holds the truth: of all, of those that are "
         "accepted or advised (told), and of those whose half width is 15 arcmin or more (wide)."
     )

@@ -36,7 +36,7 @@ def study_heading(
     kept: RunStore[RunOutcome] | None = None,
     minutes: float | None = None,
 ) -> StudyResult:
-    """Run the estimator over the families of docs/heading-family.md and measure it.
+    """Run the estimator over the families of docs/evidence/heading.md and measure it.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def _page(tables: list[FigureData], families: tuple[tuple[Family, int], ...], ru
     sections = [
         section(
             "Study: heading correction before take-off",
-            f"{runs} runs of each family of docs/heading-family.md ({seeds}), each through tables and estimator. "
+            f"{runs} runs of each family of docs/evidence/heading.md ({seeds}), each through tables and estimator. "
             "Coverage is the share of runs whose 95 % interval holds the truth; its sampling error stands beside it. "
             "Measured are coverage and half width without steady sideslip, which only family wide has. "
             "It has cells for what one flight cannot show: there only the whole interval can hold the truth.",

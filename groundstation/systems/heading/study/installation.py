@@ -1,4 +1,4 @@
-"""Study of the learned installation on fleets of docs/installation-family.md.
+"""Study of the learned installation on fleets of docs/evidence/installation.md.
 
 Coverage, half widths, acceptance.
 """
@@ -212,7 +212,7 @@ def _page(tables: Sequence[FigureData], seed: int, pool: int) -> tuple[Section, 
     return (
         section(
             "Study: the learned installation",
-            f"{AIRCRAFT} aircraft of {FLIGHTS} flights a family of docs/installation-family.md, seed {seed}, made of "
+            f"{AIRCRAFT} aircraft of {FLIGHTS} flights a family of docs/evidence/installation.md, seed {seed}, made of "
             f"{pool} one-way taxis through the whole heading estimator. Each flight is told by what the earlier ones "
             "of its serial taught; the first has its taxi alone. Coverage is the share of flights whose 95 % interval "
             "holds the truth.",

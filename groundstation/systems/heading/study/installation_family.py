@@ -1,4 +1,4 @@
-"""Fleets of docs/installation-family.md.
+"""Fleets of docs/evidence/installation.md.
 
 Aircraft with mountings, factors and winds, and what their flights show.
 """

@@ -1,6 +1,6 @@
 """Pool of one-way taxis through the whole heading estimator.
 
-Fleets of docs/installation-family.md draw from it.
+Fleets of docs/evidence/installation.md draw from it.
 """
 
 from collections.abc import Callable, Sequence

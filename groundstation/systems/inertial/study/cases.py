@@ -54,7 +54,7 @@ class FilterCase:
     is_held_out : bool
         Whether the flights stand for real ones, on which the methods are compared for good.
     is_new : bool
-        Whether nothing was tuned on flights of its route; fewer of them are flown (docs/forecast-family.md).
+        Whether nothing was tuned on flights of its route; fewer of them are flown (docs/evidence/forecast.md).
     """
 
     name: str

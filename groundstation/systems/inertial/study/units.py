@@ -29,7 +29,7 @@ def study_units(
     kept: RunStore[UnitsOutcome] | None = None,
     minutes: float | None = None,
 ) -> StudyResult:
-    """Fly and judge the family of docs/units-family.md.
+    """Fly and judge the family of docs/evidence/units.md.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def study_units(
     planned = sum(case.flights for case in cases)
     head = section(
         "Study: several INS units of one flight",
-        f"{len(outcomes)} of {planned} flights of docs/units-family.md, seeds {cases[0].seed} and {cases[-1].seed}. "
+        f"{len(outcomes)} of {planned} flights of docs/evidence/units.md, seeds {cases[0].seed} and {cases[-1].seed}. "
         "A flight is called faulty where the verdict is off or one_of.",
     )
     return StudyResult("units", tuple(one for one in found if len(one)), (head, *_sections(*found)))

@@ -177,7 +177,7 @@ def with_figure(legs: Legs, figure: Legs) -> Legs:
     return (*legs[:FIRST_TURN], *figure, *legs[FIRST_TURN + 2 :])
 
 
-# The second, wider family: docs/magnetic-family.md tells it in words
+# The second, wider family: docs/evidence/magnetic.md tells it in words
 
 
 @dataclass(frozen=True)

@@ -130,7 +130,7 @@ def _judged(cell: str, found: FluxDeviation, truth_deg: np.ndarray) -> FluxRun:
 
 def _page(found: FigureData, runs: int, seed: int) -> tuple[Section, ...]:
     text = (
-        f"{runs} flights of each cell of the fourth family (docs/magnetic-family.md), seed {seed}. Given: coefficients "
-        "that the headings flown show. Inside: share of them whose error is within 1.96 stated sigma."
+        f"{runs} flights of each cell of the fourth family (docs/evidence/magnetic.md), seed {seed}. Given: "
+        "coefficients that the headings flown show. Inside: share of them whose error is within 1.96 stated sigma."
     )
     return (section("Flux valve: coverage of A to E", text, table(found)),)

@@ -78,7 +78,7 @@ def _taxis(taxis: FigureData) -> Section:
     return section(
         "What aligns the INS",
         "Whole flights after a taxi of every verdict, the INS off by up to 2 deg (third family of "
-        "docs/magnetic-family.md): A of the table against the truth. Wanted: 0.99 of the tables within 3 sigma, 0.30 "
+        "docs/evidence/magnetic.md): A of the table against the truth. Wanted: 0.99 of the tables within 3 sigma, 0.30 "
         "deg rms where accepted.",
         table(taxis),
     )
@@ -89,7 +89,7 @@ def _coverage(coverage: FigureData) -> Section:
         "Coverage cell by cell",
         "Shares within 1.96 stated sigma on accepted flights, 0.95 wanted: A to E, and the headings of level flight; "
         "D of the iron as error over sigma. First family: whole flights and the points of the sweeps; wide: the cells "
-        "of docs/magnetic-family.md.",
+        "of docs/evidence/magnetic.md.",
         table(coverage),
     )
 

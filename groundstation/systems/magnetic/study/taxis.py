@@ -1,6 +1,6 @@
 """Third family of the magnetic study: figure-eights after a taxi of every verdict.
 
-Described in docs/magnetic-family.md. The INS is off by up to 2 deg; what aligns it is the flight's own taxi, or its
+Described in docs/evidence/magnetic.md. The INS is off by up to 2 deg; what aligns it is the flight's own taxi, or its
 turns where the taxi may not.
 """
 
