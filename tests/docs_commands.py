@@ -43,6 +43,14 @@ IMU = 'family = "hover"\nseed = 3\ntruth_rate_hz = 0\n\n[unit]\nrate_hz = 20\nim
 SETTINGS = "[heading]\ntaxi_speed_min_mps = 6.0\n"
 AIRCRAFT = "antenna_arm_m = 3.0\nentry_step_deg = 0.1\n"
 SITE = 'stand = "4A"\n\n[[stands]]\nname = "4A"\nheading_deg = 352.41\nsigma_deg = 0.02\n'
+LIMITS = """title = "Specification 7"
+
+[[limits]]
+name = "rate"
+title = "Radial error rate"
+share = 0.95
+bounds = [{ quantity = "radial_rate_fit_nmiph", at_most = 0.8 }]
+"""
 TABLE = (
     "Logger 2.1, boat 7\nTime;Lat;Lon;Speed;Hdg;Roll;Depth\ns;;;kn;deg;rad;m\n"
     "0,0;54,32010;10,14020;5,2;87,1;0,021;12,5\n0,5;54,32010;10,14022;5,3;87,3;0,019;12,5\n"
@@ -188,6 +196,7 @@ def make_folder(folder: Path) -> None:
     """Write the files that the pages name: logs of every kind, settings, and what a run left of two logs."""
     for name, text in (
         *(("settings.toml", SETTINGS), ("aircraft.toml", AIRCRAFT), ("site.toml", SITE), ("table.csv", TABLE)),
+        *(("limits.toml", LIMITS), ("unit_limits.toml", "rate_nmiph = 1.5\n")),
         *(("imu.toml", IMU), ("pair.toml", SESSION)),
     ):
         (folder / name).write_text(text, encoding="utf-8")
