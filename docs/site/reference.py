@@ -32,10 +32,10 @@ def pages() -> Mapping[str, str]:
         "ref_summary.md": _summary(json.loads(SCHEMA.read_text(encoding="utf-8"))),
         "ref_findings.md": _findings(),
         "ref_signals.md": _signals(),
-        "ref_analyses.md": _catalogue("Analyses", "analysis"),
-        "ref_formats.md": _catalogue("Formats", "format"),
+        "ref_analyses.md": _catalogue("Every analysis", "analysis"),
+        "ref_formats.md": _catalogue("Every format", "format"),
         "ref_scenarios.md": _catalogue("Simulated flights and sessions", "scenario", "session"),
-        "ref_studies.md": _catalogue("Studies", "study"),
+        "ref_studies.md": _catalogue("Every study", "study"),
     }
 
 
@@ -167,11 +167,12 @@ def _catalogue(title: str, *kinds: str) -> str:
 
 def _summary(schema: Mapping[str, Any]) -> str:
     """Return every field of summary.json: the parts of the file, each followed by the objects in it."""
+    objects = schema["$defs"]
     parts = [
         "# Every field of summary.json\n",
         f"{schema['description']} Written from schemas/summary.schema.json; a field without a meaning says it by its "
         "name. `or null`: the value may be missing.\n",
-        _fields(schema),
+        _fields(schema, objects),
     ]
     results = schema["properties"]["results"]["properties"]
     own = {name: one["$ref"] for name, one in schema["properties"].items() if "$ref" in one}
@@ -179,32 +180,41 @@ def _summary(schema: Mapping[str, Any]) -> str:
     told: set[str] = {reference.rpartition("/")[2] for reference in (*own.values(), *answers.values())}
     for path, reference in (own | answers).items():
         name = reference.rpartition("/")[2]
-        parts.append(f"## {name}\n\nIn the file: `{path}`. {_plain(schema['$defs'][name])}\n")
-        parts.append(_fields(schema["$defs"][name]))
-        for inner in _inside(schema, name, told):
-            parts.append(f"### {inner}\n\n{_plain(schema['$defs'][inner])}\n")
-            parts.append(_fields(schema["$defs"][inner]))
-    for inner in [one for one in schema["$defs"] if one not in told]:
-        parts.append(f"## {inner}\n\n{_plain(schema['$defs'][inner])}\n\n{_fields(schema['$defs'][inner])}")
+        parts.append(f"## {name}\n\nIn the file: `{path}`. {_plain(objects[name])}\n")
+        parts.append(_fields(objects[name], objects))
+        for inner in _inside(objects, name, told):
+            parts.append(f"### {inner}\n\n{_plain(objects[inner])}\n")
+            parts.append(_fields(objects[inner], objects))
+    for inner in [one for one in objects if one not in told]:
+        parts.append(f"## {inner}\n\n{_plain(objects[inner])}\n\n{_fields(objects[inner], objects)}")
     return "\n".join(parts)
 
 
-def _inside(schema: Mapping[str, Any], name: str, told: set[str]) -> Iterator[str]:
+def _inside(objects: Mapping[str, Any], name: str, told: set[str]) -> Iterator[str]:
     """Yield the objects in an object that were not told before, each before those in it."""
-    for inner in re.findall(r'"#/\$defs/(\w+)"', json.dumps(schema["$defs"][name])):
+    for inner in re.findall(r'"#/\$defs/(\w+)"', json.dumps(objects[name])):
         if inner not in told:
             told.add(inner)
             yield inner
-            yield from _inside(schema, inner, told)
+            yield from _inside(objects, inner, told)
 
 
-def _fields(described: Mapping[str, Any]) -> str:
+def _fields(described: Mapping[str, Any], objects: Mapping[str, Any]) -> str:
+    """Return the table of an object's fields; a column in which nothing stands is left out."""
     rows = [
-        (f"`{name}`", _type(one), _unit(name), _plain(one))
+        (f"`{name}`", _type(one), _unit(name), _plain(one) or _first_sentence(one, objects))
         for name, one in described["properties"].items()
         if name != "results" or "properties" not in one
     ]
-    return table(("field", "type", "unit", "meaning"), rows)
+    head = ("field", "type", "unit", "meaning")
+    kept = [at for at in range(len(head)) if any(row[at] for row in rows)]
+    return table(tuple(head[at] for at in kept), [tuple(row[at] for at in kept) for row in rows])
+
+
+def _first_sentence(one: Mapping[str, Any], objects: Mapping[str, Any]) -> str:
+    """Return what the object that a field holds is."""
+    name = next(iter(re.findall(r'"#/\$defs/(\w+)"', json.dumps(one))), "")
+    return _plain(objects[name]).partition(". ")[0].rstrip(".") if name else ""
 
 
 def _plain(described: Mapping[str, Any]) -> str:
