@@ -41,11 +41,13 @@ def verdict_first(verdict: str, text: str) -> str:
     'failed: autopilot health: gyros disagree'
     >>> verdict_first("Reject", "magnetic deviation reject (no turn)")
     'reject: magnetic deviation (no turn)'
+    >>> verdict_first("Off", "ins.1 is off: velocity error 3.2 m/s")
+    'off: ins.1: velocity error 3.2 m/s'
     """
     word = f"{verdict[:1].lower()}{verdict[1:]}"
     if text.lower().startswith(word.lower()):
         return text
-    head = re.match(rf"([^:;,(]*?) {re.escape(word)}(?=[:;,( ]|$)", text, re.IGNORECASE)
+    head = re.match(rf"([^:;,(]*?)(?: is)? {re.escape(word)}(?=[:;,( ]|$)", text, re.IGNORECASE)
     return f"{word}: {text if head is None else head.group(1) + text[head.end() :]}"
 
 
