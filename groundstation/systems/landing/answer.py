@@ -295,3 +295,9 @@ class LandingResult(Answer):
     remarks: tuple[str, ...] = ()
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
+
+    @property
+    def last(self) -> Approach | None:
+        """The last landing, or the last approach of a flight without one."""
+        landings = [one for one in self.approaches if one.outcome != "go-around"]
+        return next(reversed(landings or self.approaches), None)
