@@ -136,7 +136,7 @@ def thin_series(series: Sequence[FloatArray], breaks: BoolArray, limit: int) -> 
 
 
 def _keep_extremes(values: FloatArray, length: int, keep: BoolArray) -> None:
-    """Mark the lowest and the highest row of every stretch of a length, some stretches at a time."""
+    """Mark the lowest and the highest row of every stretch, some stretches at a time."""
     at_once = max(ROWS_AT_ONCE // length, 1)
     for first in range(0, -(-len(values) // length), at_once):
         part = values[first * length : (first + at_once) * length]
