@@ -332,7 +332,10 @@ def read_flight(mcap: Path, converted: Converted) -> Flight:
 
     info = converted.info
     batches = (item for item in read(mcap) if isinstance(item, RecordBatch))
-    return flight_from_batches(batches, metadata=info.metadata, has_utc=info.has_utc, source_name=info.source_name)
+    rows = {topic: entry.rows for topic, entry in info.ledger.topics.items()}
+    return flight_from_batches(
+        batches, metadata=info.metadata, has_utc=info.has_utc, source_name=info.source_name, rows=rows
+    )
 
 
 def state_of(findings: tuple[Finding, ...], has_lost_data: bool, fail_on: str) -> State:
