@@ -449,7 +449,7 @@ def test_a_fleet_is_a_frame(tmp_path: Path) -> None:
 
 def test_results_show_their_numbers_and_not_their_arrays(flight: OpenLog) -> None:
     shown = flight.heading()._repr_html_()
-    assert "correction_deg" in shown and "-1.2" in shown and "gates" not in shown
+    assert "correction_deg" in shown and "-1.2" in shown and "required" not in shown
     assert repr(flight.results.figure("heading_normal")).startswith("<FigureData heading_normal: ")
     hostile = replace(flight.heading(), verdict_reason="<b>")._repr_html_()
     assert "<b>" not in hostile and "&lt;b&gt;" in hostile
