@@ -84,10 +84,12 @@ class OpenLog(OpenFlight):
 
     @cached_property
     def flight(self) -> "Flight":
+        """Every topic on the corrected clock, as the estimators take it."""
         return self._conversion.read(self._thresholds)[1]
 
     @cached_property
     def results(self) -> "FlightResults":
+        """Answers of all analyses, as frozen dataclasses."""
         from groundstation.pipeline.one_flight.analyse import analyse
         from groundstation.pipeline.one_flight.flight import given_of
 
@@ -149,6 +151,7 @@ class SavedRun(OpenFlight):
 
     @cached_property
     def results(self) -> "FlightResults":
+        """Answers of all analyses, as frozen dataclasses."""
         return self.saved.results
 
     @property
@@ -172,6 +175,7 @@ class SavedRun(OpenFlight):
 
     @cached_property
     def flight(self) -> "Flight":
+        """Every topic on the corrected clock, as the estimators take it."""
         return self._log.flight
 
     @cached_property
