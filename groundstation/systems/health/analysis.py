@@ -94,6 +94,7 @@ def _read(flight: "Flight", known: Known) -> _Read:
         Where the log holds nothing that a check judges.
     """
     from groundstation.systems.health.autopilots import autopilot_of
+    from groundstation.systems.health.ending import ends_in_the_air
     from groundstation.systems.health.evidence import in_the_air
     from groundstation.systems.health.parameters import events as events_of_settings
     from groundstation.systems.health.parameters import settings_of
@@ -106,7 +107,8 @@ def _read(flight: "Flight", known: Known) -> _Read:
     if not events and not any(bool(np.isfinite(one.value).any()) for one in evidence):
         raise NotAssessableError(CODE, "the log holds no field that a check of the autopilot judges")
     air, stated = in_the_air(flight, known), settings_of(flight, known)
-    return _Read(autopilot.name, air, evidence, (*events, *events_of_settings(stated, air)), stated)
+    every = (*events, *events_of_settings(stated, air), *ends_in_the_air(flight, air))
+    return _Read(autopilot.name, air, evidence, every, stated)
 
 
 def _checked(flight: "Flight", known: Known, settings: HealthSettings) -> _Checked:
