@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
+from groundstation.results.frames import Brief
 from groundstation.results.roles import WordsOfRecord
 
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
@@ -146,7 +147,7 @@ class VelocityAgainstPosition:
 
 
 @dataclass(frozen=True)
-class GnssReceiver:
+class GnssReceiver(Brief):
     """Reception of one receiver.
 
     Medians and shares are of time with a fix; ``*_low`` and ``*_high`` leave one twentieth of the time beyond them.

@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Literal
 
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
+from groundstation.results.frames import Brief
 
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
 
@@ -124,7 +125,7 @@ class Measure:
 
 
 @dataclass(frozen=True)
-class Check:
+class Check(Brief):
     """One check: its verdict, why, and the quantities behind it.
 
     ``events_in_air`` counts warnings and failures that were logged in the air; ``first_event_s`` is the flight time of
