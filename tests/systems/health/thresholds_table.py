@@ -10,22 +10,36 @@ from groundstation.systems.health.checks import CHECKS
 from groundstation.systems.health.limits import Threshold, shipped
 
 PAGE = Path(__file__).parents[3] / "docs" / "health_checks.md"
-HEAD = "|check|quantity|what it is|amber|red|decides|source|\n|---|---|---|---|---|---|---|\n"
+HEAD = "|quantity|amber|red|decides|source|\n|---|---|---|---|---|\n"
 BEGIN, END = "<!-- thresholds -->\n", "<!-- end of thresholds -->\n"
+SHORT = {  # the page names files and commits below the table
+    "PX4 Tools/ecl_ekf/check_level_dict.csv": "ecl_ekf",
+    "ArduPilot LogAnalyzer": "LogAnalyzer",
+    "dronekit-la analyzer_": "dronekit-la ",
+    " (read 2026-11-26)": "",
+    " (2022-02-24)": "",
+    " (2022-04-12)": "",
+    " (2023-12-11)": "",
+}
 
 
 def table() -> str:
-    """The rows, check by check."""
-    order = list(CHECKS)
-    rows = sorted(shipped().items(), key=lambda item: order.index(item[1].check))
-    return HEAD + "".join(_row(quantity, limit) for quantity, limit in rows)
+    """Return a table for each check."""
+    rows = {check: [_row(*item) for item in shipped().items() if item[1].check == check] for check in CHECKS}
+    return "".join(
+        f"\n## {CHECKS[check][0].upper()}{CHECKS[check][1:]}: `{check}`\n\n{HEAD}{''.join(of_check)}"
+        for check, of_check in rows.items()
+        if of_check
+    )
 
 
 def _row(quantity: str, limit: Threshold) -> str:
     amber, red = _level(limit.amber, limit.amber_below), _level(limit.red, limit.red_below)
     unit = f", {limit.unit}" if limit.unit else ""
-    source = limit.source.replace(" (read 2026-11-26)", "")
-    return f"|{limit.check}|`{quantity}`|{limit.title}{unit}|{amber}|{red}|{_told(limit)}|{source}|\n"
+    source = limit.source
+    for long, short in SHORT.items():
+        source = source.replace(long, short)
+    return f"|{limit.title}{unit}: `{quantity}`|{amber}|{red}|{_told(limit)}|{source}|\n"
 
 
 def _level(above: float | None, below: float | None) -> str:
