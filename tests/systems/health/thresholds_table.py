@@ -25,12 +25,12 @@ SHORT = {  # the page names files and commits below the table
 
 def table() -> str:
     """Return a table for each check."""
-    rows = {check: [_row(*item) for item in shipped().items() if item[1].check == check] for check in CHECKS}
-    return "".join(
-        f"\n## {CHECKS[check][0].upper()}{CHECKS[check][1:]}: `{check}`\n\n{HEAD}{''.join(of_check)}"
-        for check, of_check in rows.items()
-        if of_check
-    )
+    told = []
+    for check, title in CHECKS.items():
+        rows = [_row(quantity, limit) for quantity, limit in shipped().items() if limit.check == check]
+        if rows:
+            told.append(f"\n## {title[0].upper()}{title[1:]}: `{check}`\n\n{HEAD}{''.join(rows)}")
+    return "".join(told)
 
 
 def _row(quantity: str, limit: Threshold) -> str:
