@@ -29,15 +29,11 @@ RUN_IN_SLOW = {
 # Pages whose commands are still to be mended; they are parsed and run by nothing until then.
 TO_DO = frozenset(
     (
-        "docs/approaches.md",
         "docs/bags.md",
         "docs/chapter10.md",
-        "docs/control.md",
         "docs/integrity.md",
         "docs/profiles.md",
-        "docs/reference.md",
         "docs/tlog.md",
-        "docs/trajectory_out.md",
     )
 )
 
