@@ -44,6 +44,7 @@ SETTINGS = "[heading]\ntaxi_speed_min_mps = 6.0\n"
 AIRCRAFT = "antenna_arm_m = 3.0\nentry_step_deg = 0.1\n"
 SITE = 'stand = "4A"\n\n[[stands]]\nname = "4A"\nheading_deg = 352.41\nsigma_deg = 0.02\n'
 LIMITS = """title = "Specification 7"
+source = "specification 7, issue 2"
 
 [[limits]]
 name = "rate"

@@ -99,6 +99,7 @@ def done(page: Path, only_parsed: dict[str, str]) -> list[str]:
     for command in commands(page):
         verb = next((word for word in command.words[1:] if not word.startswith("-")), "")
         is_run = verb not in only_parsed or "--list" in command.words or "--no-recording" in command.words
+        is_run &= not any("://" in word for word in command.words)  # clusters and buckets are not here
         problems.append(parse(command, made) or (run(command) if is_run else ""))
     return [problem for problem in problems if problem]
 
