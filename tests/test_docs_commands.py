@@ -120,7 +120,8 @@ def test_lines_are_read_as_a_shell_reads_them(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(
         "groundstation info prose.csv\n\n```\n$ groundstation info a.csv  # why\ngroundstation info a.ch10 \\\n"
-        "    --suggest-icd > a.yaml\nmake x && groundstation list | head\n```\n\n    groundstation list 'b c.csv'\n    error: no\n",
+        "    --suggest-icd > a.yaml\nmake x && groundstation list | head\n```\n\n    groundstation list 'b c.csv'\n"
+        "    error: no\n",
         encoding="utf-8",
     )
     assert commands(page) == (
