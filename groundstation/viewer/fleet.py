@@ -4,12 +4,12 @@ Its timelines are ``utc`` and ``flight_number``.
 """
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import rerun as rr
 import rerun.blueprint as rrb
 
-from groundstation.base.failures import attempt
 from groundstation.chapters.plots.fleet.trend import HEADING
 from groundstation.results.fleet import FleetResults
 from groundstation.systems.system import Systems
@@ -24,6 +24,7 @@ from groundstation.viewer.fleet_charts import (
 from groundstation.viewer.fleet_density import heading_error_density
 from groundstation.viewer.fleet_recorder import FLIGHT_NUMBER, FleetRecorder
 from groundstation.viewer.fleet_text import aircraft_text, failed_text, flights_text
+from groundstation.viewer.held_stream import HeldStream
 from groundstation.viewer.recording import save_stream, send_layout
 from groundstation.viewer.views import document
 
@@ -51,21 +52,24 @@ def write_fleet_recording(path: Path, fleet: FleetResults, systems: Systems) -> 
 
 
 def send_fleet(stream: rr.RecordingStream, fleet: FleetResults, systems: Systems) -> rrb.Blueprint:
-    """Log a fleet to a stream that has its sink, and send the layout.
+    """Log a fleet to a stream that has its sink, its layout first.
 
     Waits until all is out; returns the layout.
     """
-    recorder = FleetRecorder(stream, fleet, systems)
+    held = HeldStream(stream)
+    recorder = FleetRecorder(held.stream, fleet, systems)
     stream.send_recording_name("Fleet")
-    logged = (attempt("aircraft", one.name, _logged, recorder, fleet, one) for one in aircraft_of(fleet))
+    logged = (held.attempt("aircraft", one.name, partial(_logged, recorder, fleet, one)) for one in aircraft_of(fleet))
     found = [one for one in logged if one is not None]
     tabs = [
-        *(attempt("tab", name, tab, recorder, fleet, found) for name, tab in TABS.items()),
-        *(attempt("tab", tab.name, tab.log, recorder, fleet) for tab in systems.fleet_tabs),
-        *(attempt("tab", name, tab, recorder, fleet, found) for name, tab in TABS_BEHIND.items()),
+        *(held.attempt("tab", name, partial(tab, recorder, fleet, found)) for name, tab in TABS.items()),
+        *(held.attempt("tab", tab.name, partial(tab.log, recorder, fleet)) for tab in systems.fleet_tabs),
+        *(held.attempt("tab", name, partial(tab, recorder, fleet, found)) for name, tab in TABS_BEHIND.items()),
     ]
     shown = [tab for tab in tabs if tab is not None]
-    return send_layout(stream, shown, timeline=FLIGHT_NUMBER)  # on utc, the flights of a year are a few columns of dots
+    layout = send_layout(stream, shown, timeline=FLIGHT_NUMBER)  # on utc, the flights of a year are columns of dots
+    held.release()
+    return layout
 
 
 def _logged(recorder: FleetRecorder, fleet: FleetResults, one: ChartedAircraft) -> Logged:

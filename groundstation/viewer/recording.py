@@ -23,6 +23,7 @@ from groundstation.results.answer import Answer
 from groundstation.results.flight import FlightResults
 from groundstation.systems.system import Systems
 from groundstation.tables.table import Flight
+from groundstation.viewer.held_stream import HeldStream
 from groundstation.viewer.inner import forget_closed, send_blueprint
 from groundstation.viewer.names import clean_text
 from groundstation.viewer.properties import send_properties
@@ -37,7 +38,7 @@ APPLICATION = "groundstation"
 DEFAULT_VIEWER_URL = "rerun+http://127.0.0.1:9876/proxy"
 DEFAULT_PORT = 9876
 NamedTab = tuple[str, Callable[[], rrb.Container | None]]
-CONNECT_SECONDS, FLUSH_SECONDS = 3.0, 60.0
+CONNECT_SECONDS = 3.0
 
 
 def write_recording(path: Path, flight: Flight, results: FlightResults, systems: Systems) -> None:
@@ -122,14 +123,15 @@ def _expect_viewer(url: str) -> None:
 def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResults, systems: Systems) -> rrb.Blueprint:
     """Log everything to a stream that has its sink, and return the layout.
 
-    The layout is sent, and the call returns when all is out.
+    The layout is sent first, and the call returns when all is out.
     """
-    recorder = Recorder(stream, flight.start_ns, flight.has_utc, systems)
+    held = HeldStream(stream)
+    recorder = Recorder(held.stream, flight.start_ns, flight.has_utc, systems)
     stream.send_recording_name(clean_text(results.flight_id))
     attempt("properties", "results", send_properties, stream, results)
     if flight.has_utc:
         stream.send_recording_start_time_nanos(flight.start_ns)
-    return send_layout(stream, logged(tabs_of(recorder, flight, results), recorder, flight, results))
+    return send_tabs(stream, held, with_log(tabs_of(recorder, flight, results), recorder, flight, results))
 
 
 def tabs_of(recorder: Recorder, flight: Flight, results: FlightResults) -> Iterator[NamedTab]:
@@ -140,12 +142,22 @@ def tabs_of(recorder: Recorder, flight: Flight, results: FlightResults) -> Itera
     yield "raw", partial(raw, recorder, flight, results)
 
 
-def logged(tabs: Iterable[NamedTab], recorder: Recorder, flight: Flight, results: FlightResults) -> list[rrb.Container]:
-    """Log tabs and, behind them, the log, which tells of those that failed and are left out."""
-    shown = [attempt("tab", name, tab) for name, tab in tabs]
-    told = replace(results, findings=with_failures(results.findings, failures()))
-    shown.append(attempt("tab", "log", log, recorder, flight, told))
-    return [tab for tab in shown if tab is not None]
+def with_log(tabs: Iterable[NamedTab], recorder: Recorder, flight: Flight, results: FlightResults) -> Iterator[NamedTab]:
+    """Tabs and, behind them, the log, which tells of those that failed and are left out."""
+    yield from tabs
+    yield "log", partial(_log, recorder, flight, results)
+
+
+def _log(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Container:
+    return log(recorder, flight, replace(results, findings=with_failures(results.findings, failures())))
+
+
+def send_tabs(stream: rr.RecordingStream, held: HeldStream, tabs: Iterable[NamedTab]) -> rrb.Blueprint:
+    """Let tabs log in their order, send the layout, then what they logged; returns the layout."""
+    shown = [held.attempt("tab", name, tab) for name, tab in tabs]
+    layout = send_layout(stream, [tab for tab in shown if tab is not None])
+    held.release()
+    return layout
 
 
 def answer_tabs(kind: type[Answer] | None, recorder: Recorder, results: FlightResults) -> Iterator[NamedTab]:
@@ -172,10 +184,7 @@ def _generic(names: Iterable[str], recorder: Recorder, results: FlightResults) -
 def send_layout(
     stream: rr.RecordingStream, tabs: Sequence[rrb.Container], *, timeline: str = FLIGHT_TIME
 ) -> rrb.Blueprint:
-    """Send the layout of a recording, and wait until all is out.
-
-    Its panels are closed and its time stands still.
-    """
+    """Send the layout of a recording: its panels are closed and its time stands still."""
     blueprint = rrb.Blueprint(
         rrb.Tabs(contents=tabs, active_tab=0),
         rrb.TimePanel(state="collapsed", timeline=timeline, play_state="paused"),
@@ -185,7 +194,6 @@ def send_layout(
         auto_views=False,
     )
     send_blueprint(stream, blueprint)
-    stream.flush(timeout_sec=FLUSH_SECONDS)
     return blueprint
 
 
