@@ -9,10 +9,10 @@ from groundstation.results.fleet import FleetResults
 from groundstation.results.fleet_trends import SlopeRow
 
 CAPTION = (
-    "Flights since the last change of level, six or more. Slope: median over all pairs of flights; in brackets 95 %, "
-    "from the scatter of the flights. Level now: the line at the last flight. A slope is called where the flights "
-    "show a change that a line explains as well as a step does. Limits: --unit-limits; of the test ratio 1. The date "
-    "continues the line."
+    "Flights since the last change of level, or all, six or more. Slope: median over all pairs of flights; in "
+    "brackets 95 %, from the scatter of the flights. Level now: the line at the last flight. A slope is called where "
+    "the flights show a change that a line explains as well as a step does. Limits: --unit-limits; of vibration and "
+    "HDOP that from which the check warns; of the test ratio 1. The date continues the line."
 )
 
 
@@ -21,16 +21,23 @@ def sloping(fleet: FleetResults) -> list[SlopeRow]:
     return [one for one in fleet.slopes if one.is_slope]
 
 
-def sentence_of(one: SlopeRow) -> str:
+def sentence_of(one: SlopeRow, fleet: FleetResults) -> str:
     """Return a slope as a sentence: how fast, how sure, since when, when it reaches its limit."""
     slope, low, high = (_slope(one, value) for value in one.per_flight)
     told = (
         f"{aircraft_name(one.aircraft)}: {title_of(one.quantity)} {_verb(one)} by {slope} a flight (95 % {low} … "
-        f"{high}) over {number(one.flights, 0)} flights since {_date(one.since_utc_ns)}, now "
+        f"{high}) over {number(one.flights, 0)} flights since {_since(one, fleet)}, now "
         f"{figure_of(one.quantity, one.level)}"
     )
     due = _due(one)
     return f"{told}; {due}." if due else f"{told}."
+
+
+def _since(one: SlopeRow, fleet: FleetResults) -> str:
+    """Return the day from which on a line runs, and whether a step is there."""
+    changes = ((change.aircraft, change.quantity, change.start_utc_ns) for change in fleet.change_points)
+    step = "the last step, " if (one.aircraft, one.quantity, one.since_utc_ns) in changes else ""
+    return f"{step}{_date(one.since_utc_ns)}"
 
 
 def grid(fleet: FleetResults) -> Grid | None:
@@ -42,7 +49,7 @@ def grid(fleet: FleetResults) -> Grid | None:
         *(Head("Level now", True), Head("State"), Head("Limit", True), Head("Reached on")),
     )
     order = sorted(fleet.slopes, key=lambda one: not one.is_slope)
-    return Grid("Slopes", heads, [_row(one) for one in order], CAPTION)
+    return Grid("Slopes since the last step", heads, [_row(one) for one in order], CAPTION)
 
 
 def _row(one: SlopeRow) -> tuple[Cell, ...]:
