@@ -14,7 +14,7 @@ from typing import Any
 from groundstation.chapters.wording import clean
 from groundstation.reports.live import Frame, LivePanel, page_data
 
-_ID = re.compile(r"\b(?:\d{8}T\d{6}Z|NOTIME_[0-9a-f]{8})[\w-]{0,32}(?![\w-])")
+_WHOLE = re.compile(r"\b(?:(?:\d{8}T\d{6}Z|NOTIME_[0-9a-f]{8})[\w-]{0,32}|\d{4}-\d\d-\d\d)(?![\w-])")
 TEMPLATES = Path(__file__).parent / "templates"
 # Nothing may be loaded, nothing run but scripts that a template names by digest. SVG sets style attributes, hence
 # unsafe-inline.
@@ -56,7 +56,9 @@ def digest_of(script: str) -> str:
 
 
 def whole_ids(value: str) -> Any:
-    """Return escaped text in which no line breaks within the id of a flight that is not too long for one.
+    """Return escaped text in which no line breaks within a date, or the id of a flight.
+
+    Very long ids are as other words.
 
     Examples
     --------
@@ -66,9 +68,9 @@ def whole_ids(value: str) -> Any:
     from markupsafe import Markup, escape
 
     text = clean(value)
-    if not _ID.search(text):
+    if not _WHOLE.search(text):
         return text
-    return Markup(_ID.sub(r'<span class="id">\g<0></span>', str(escape(text))))
+    return Markup(_WHOLE.sub(r'<span class="id">\g<0></span>', str(escape(text))))
 
 
 @cache

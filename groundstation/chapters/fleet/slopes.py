@@ -53,16 +53,17 @@ def grid(fleet: FleetResults) -> Grid | None:
 
 
 def _row(one: SlopeRow) -> tuple[Cell, ...]:
-    slope, low, high = (_slope(one, value) for value in one.per_flight)
-    level, least, most = (figure_of(one.quantity, value) for value in (one.level, one.level_low, one.level_high))
+    title, unit, places = QUANTITIES[one.quantity]
+    slope, low, high = (_slope(one, value, has_unit=False) for value in one.per_flight)
+    level, least, most = (bounded(value, places) for value in (one.level, one.level_low, one.level_high))
     state: Cell = Mark("bad", "beyond") if one.is_over else Mark("warn", _verb(one)) if one.is_slope else "no slope"
     due = ABSENT
     if one.due_utc_ns is not None:
         due = f"{_date(one.due_utc_ns)} ({_date(one.due_earliest_utc_ns)} … {_end(one)})"
     return (
-        *(aircraft_name(one.aircraft), title_of(one.quantity), number(one.flights, 0)),
+        *(aircraft_name(one.aircraft), f"{title}, {unit}" if unit else title, number(one.flights, 0)),
         *(f"{slope} ({low} … {high})", f"{level} ({least} … {most})", state),
-        *(ABSENT if one.limit is None else _limit(one), due),
+        *(ABSENT if one.limit is None else bounded(one.limit, places), due),
     )
 
 
@@ -74,10 +75,10 @@ def _end(one: SlopeRow) -> str:
     return "no sure end" if one.due_latest_utc_ns is None else _date(one.due_latest_utc_ns)
 
 
-def _slope(one: SlopeRow, value: float) -> str:
+def _slope(one: SlopeRow, value: float, *, has_unit: bool = True) -> str:
     """Return a slope in the unit of its quantity, with a decimal more."""
     _, unit, places = QUANTITIES[one.quantity]
-    return bounded(value, max(places + 1, 3), unit, signed=True)
+    return bounded(value, max(places + 1, 3), unit if has_unit else "", signed=True)
 
 
 def _verb(one: SlopeRow) -> str:
