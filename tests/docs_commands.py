@@ -6,6 +6,7 @@ import shutil
 import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from groundstation.cli.main import app
 from tests.readers.trajectory_writer import pos_rows
 
 ROOT = Path(__file__).parent.parent
-DONE, DATA_LOST = 0, 3
+DONE, FAILED, USAGE, DATA_LOST, LIMIT_REACHED = 0, 1, 2, 3, 4
 
 SESSION = """
 title = "Two aircraft and a ground point"
@@ -44,6 +45,7 @@ SETTINGS = "[heading]\ntaxi_speed_min_mps = 6.0\n"
 AIRCRAFT = "antenna_arm_m = 3.0\nentry_step_deg = 0.1\n"
 SITE = 'stand = "4A"\n\n[[stands]]\nname = "4A"\nheading_deg = 352.41\nsigma_deg = 0.02\n'
 LIMITS = """title = "Specification 7"
+source = "specification 7, issue 2"
 
 [[limits]]
 name = "rate"
@@ -60,11 +62,12 @@ TABLE = (
 
 @dataclass(frozen=True)
 class Command:
-    """A line of a page: the words, and the file that its output goes to."""
+    """A line of a page: the words, the file that its output goes to, the error that the page shows below it."""
 
     place: str
     words: tuple[str, ...]
     into: str = ""
+    error: str = ""
 
     def __str__(self) -> str:
         return f"{self.place}: {shlex.join(self.words)}"
@@ -76,11 +79,12 @@ class Command:
 def commands(page: Path, tools: Sequence[str] = ("groundstation",)) -> tuple[Command, ...]:
     """Return the calls of these tools in a page's blocks of code, in their order."""
     found = []
-    for number, line in _lines(page.read_text(encoding="utf-8")):
+    lines = tuple(_lines(page.read_text(encoding="utf-8")))
+    for (number, line), (_, below) in zip_longest(lines, lines[1:], fillvalue=(0, "")):
         for text in _without_comment(line.removeprefix("$ ")).split("&&"):
             if text.split()[:1] and text.split()[0] in tools:
                 words, into = _redirected(shlex.split(text.partition(" | ")[0]))
-                found.append(Command(f"{page.name}:{number}", words, into))
+                found.append(Command(f"{page.name}:{number}", words, into, below if below[:6] == "error:" else ""))
     return tuple(found)
 
 
@@ -116,7 +120,11 @@ def _redirected(words: list[str]) -> tuple[tuple[str, ...], str]:
 def run(command: Command) -> str:
     """Run a call in this process, in the working directory; return what is wrong, or nothing."""
     done = CliRunner().invoke(app, _as_shell(command.words[1:]))
-    if done.exit_code not in (DONE, DATA_LOST):
+    if command.error:
+        is_so = done.exit_code in (FAILED, USAGE) and command.error in done.output
+        return "" if is_so else f"{command}: not the error of the page: {done.output[-1000:]}"
+    no_is_an_answer = LIMIT_REACHED if "--for" in command.words else DONE  # the taxi cannot be used for all
+    if done.exit_code not in (DONE, DATA_LOST, no_is_an_answer):
         return f"{command}: exit code {done.exit_code}\n{done.output[-1000:]}{_crash(done.exception)}"
     if command.into:
         Path(command.into).write_text(done.stdout, encoding="utf-8")
@@ -195,7 +203,13 @@ def _absent(command: Command, files: Sequence[str]) -> list[str]:
 def make_folder(folder: Path) -> None:
     """Write the files that the pages name: logs of every kind, settings, and what a run left of two logs."""
     for name, text in (
-        *(("settings.toml", SETTINGS), ("aircraft.toml", AIRCRAFT), ("site.toml", SITE), ("table.csv", TABLE)),
+        *(
+            ("settings.toml", SETTINGS),
+            ("aircraft.toml", AIRCRAFT),
+            ("site.toml", SITE),
+            ("table.csv", TABLE),
+            ("boat.csv", TABLE),
+        ),
         *(("limits.toml", LIMITS), ("unit_limits.toml", "rate_nmiph = 1.5\n")),
         *(("imu.toml", IMU), ("pair.toml", SESSION)),
     ):
