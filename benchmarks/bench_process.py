@@ -1,7 +1,8 @@
 """Whole processes, as a user types them: our verbs on logs of each format and size, beside the commands of peers.
 
 Every command is a new process; its wall seconds and its processor seconds (user and system) are those that the
-operating system counted. Commands of one log take turns, so that what else the machine does slows all alike. ``--against FOLDER`` measures another checkout of the package beside this one.
+operating system counted. Commands of one log take turns, so that what else the machine does slows all alike.
+``--against FOLDER`` measures another checkout of the package beside this one.
 ``--cold`` adds the first run on a new machine: nothing compiled yet.
 
 Logs are a recorded or simulated one: its beginning for the small, its data repeated, times going on, for the long.

@@ -198,8 +198,7 @@ def by_pyins(of: Given) -> Side:
         Position(fixes, POSITION_SIGMA_M, flight.lever_arm_m),
         NedVelocity(fixes, VELOCITY_SIGMA_MPS, flight.lever_arm_m),
     ]
-    sigmas = PYINS_GOAL, INSLIB_GOAL, SMOOTHER_GOAL = Goal(100.0, "at least"), Goal(1.0, "at least"), Goal(3.0)
-POSITION_START_M, VELOCITY_START_MPS, LEVEL_START_DEG, HEADING_START_DEG
+    sigmas = POSITION_START_M, VELOCITY_START_MPS, LEVEL_START_DEG, HEADING_START_DEG
 
     def run() -> Found:
         done = run_feedback_filter(start, *sigmas, increments, gyro, accelerometer, seen, time_step=STEP_S)

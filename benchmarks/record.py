@@ -344,11 +344,11 @@ def number(value: float | None) -> str:
     Examples
     --------
     >>> number(0.01234), number(12.345), number(12345.6), number(None)
-    ('0.0123', '12.3', '12346', '')
+    ('0.0123', '12.3', '12 346', '')
     """
     if value is None:
         return ""
-    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
+    return f"{value:,.0f}".replace(",", " ") if abs(value) >= 1000.0 else f"{value:.3g}"
 
 
 def ratio_told(record: Record) -> str:

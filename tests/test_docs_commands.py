@@ -26,8 +26,6 @@ RUN_IN_SLOW = {
     "plan": "optimises, up to a minute",
     "simulate": "hours of flight in some scenarios, 10 s",
 }
-# Pages whose commands are still to be mended; they are parsed and run by nothing until then.
-TO_DO = frozenset(("docs/reference.md", "docs/evidence/inertial-units.md"))
 
 
 @pytest.fixture(scope="session")
@@ -65,7 +63,7 @@ def name_of(page: Path) -> str:
 
 
 def pages(tool: str) -> list[Path]:
-    return [page for page in PAGES if name_of(page) not in TO_DO and commands(page, (tool,))]
+    return [page for page in PAGES if commands(page, (tool,))]
 
 
 @pytest.mark.parametrize("page", pages("groundstation"), ids=name_of)

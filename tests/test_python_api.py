@@ -4,9 +4,10 @@ import inspect
 import pickle
 import re
 import typing
-from dataclasses import is_dataclass
+from dataclasses import dataclass, is_dataclass, replace
 from pathlib import Path
 from types import UnionType
+from typing import ClassVar
 
 import numpy as np
 import pandas as pd
@@ -19,20 +20,23 @@ from groundstation.pipeline.api import OpenLog, SavedRun
 from groundstation.pipeline.fleet_frame import Fleet
 from groundstation.pipeline.notebook import OpenFlight
 from groundstation.results.answer import Answer
+from groundstation.results.figures import FigureData
 from groundstation.results.frames import Tabular, tables_of
 from groundstation.results.gates import Gate
-from groundstation.systems import systems
+from groundstation.systems import OURS, systems
+from groundstation.systems.analysis import Analysis, Found
 from groundstation.systems.landing.answer import Approach, LandingResult, StabilisedAt, StabilityLost
 from groundstation.systems.landing.criteria_answer import Criterion, Place
 from groundstation.systems.landing.runway_answer import RunwayUsed
 from groundstation.systems.landing.touchdown_answer import SecondContact, Touchdown
+from groundstation.systems.system import System, Systems
 from groundstation.tables import table as table_module
 from tests import report_example
 from tests.readers.ulog_writer import UlogWriter
 from tests.systems.inertial import example as inertial_example
 
 ROOT = Path(__file__).parents[1]
-GOOD = ROOT / "sample_logs" / "taxi-good.csv"
+GOOD, SHORT = ROOT / "sample_logs" / "taxi-good.csv", ROOT / "sample_logs" / "taxi-short.csv"
 PAGE = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
 UNITS = re.compile(r"\b(unit|units|degrees|deg|metres|m|m/s|seconds|s|nmi/h|ppm|minutes)\b")
 MOST_WORDS, MOST_LINES, MOST_CHARACTERS = 800, 4, 450
@@ -41,7 +45,8 @@ MOST_WORDS, MOST_LINES, MOST_CHARACTERS = 800, 4, 450
 def methods() -> dict[str, type[Answer]]:
     """Methods of the answers, by what they return."""
     own = {name: one for name, one in vars(AnswerMethods).items() if inspect.isfunction(one) and name != "answer"}
-    return {name: typing.get_type_hints(one)["return"] for name, one in own.items() if not name.startswith("_")}
+    known = {kind.__name__: kind for kind in systems().answer_types.values()}
+    return {name: known[one.__annotations__["return"]] for name, one in own.items() if not name.startswith("_")}
 
 
 @pytest.fixture(scope="module")
@@ -117,18 +122,12 @@ def landing() -> LandingResult:
 
 def test_every_system_has_its_method_and_every_answer_one() -> None:
     found = methods()
-    ours = [one for one in systems().every if one.name in {path.split(".")[2] for path in _ours()}]
+    ours = [one for one in systems().every if one.name in {path.split(".")[2] for path in OURS}]
     for system in ours:
         answers = {analysis.answer for analysis in (*system.analyses, *system.session_analyses)}
         if answers:
             assert found.get(system.name) in answers, f"no method {system.name}()"
         assert answers <= set(found.values()), system.name
-
-
-def _ours() -> tuple[str, ...]:
-    from groundstation.systems import OURS
-
-    return OURS
 
 
 def test_an_answer_is_had_by_its_type_its_name_and_its_method(flight: OpenLog) -> None:
@@ -142,6 +141,32 @@ def test_an_answer_is_had_by_its_type_its_name_and_its_method(flight: OpenLog) -
         flight.cooperative()
     with pytest.raises(NotAssessableError, match="found a flight, expected the folder of a plan"):
         flight.answer("control")
+
+
+@dataclass(frozen=True)
+class Wind(Answer):
+    """Answer of somebody else's system."""
+
+    analysis: ClassVar[str] = "wind"
+
+    speed_mps: float
+    figures: tuple[FigureData, ...] = ()
+
+
+def test_the_answer_of_a_plug_in_is_had_by_its_type_and_name(flight: OpenLog, monkeypatch: pytest.MonkeyPatch) -> None:
+    @dataclass(frozen=True)
+    class Nothing:
+        """No settings."""
+
+    analysis = Analysis("wind", "wind", "wind", "airspeed", Nothing, Wind, lambda *_: Found(Wind(3.0)))
+    theirs = Systems((*systems().every, System("wind_and_weather", analyses=(analysis,))))
+    monkeypatch.setattr("groundstation.systems.systems", lambda: theirs)
+    with pytest.raises(NotAssessableError, match="wind: found no answer, expected airspeed"):
+        flight.answer("wind")
+    opened = groundstation.open(GOOD)
+    answers = {**flight.results.answers, "wind": Wind(3.0)}
+    opened.__dict__["results"] = replace(flight.results, answers=answers)
+    assert opened.answer("wind") == opened.answer(Wind) == opened.answer("wind_and_weather") == Wind(3.0)
 
 
 def test_every_method_answers_or_says_why_in_a_line(flight: OpenLog) -> None:
@@ -296,19 +321,19 @@ def test_events_phases_and_findings_are_frames(flight: OpenLog) -> None:
         silent.utc(0.0)
 
 
-def test_a_reference_judges_as_the_option_of_run_does(flight: OpenLog, tmp_path: Path) -> None:
-    gnss = flight.tables["gnss"]
+def test_a_reference_judges_as_the_option_of_run_does(fleet: Fleet, tmp_path: Path) -> None:
+    gnss = groundstation.open(SHORT).tables["gnss"]
     columns = {f"gnss.{name}": gnss[name] for name in ("latitude_deg", "longitude_deg")}
     times = {"time_utc": np.char.add(np.datetime_as_string(gnss.utc, unit="ms"), "Z")}
     pd.DataFrame(times | columns).to_csv(tmp_path / "reference.csv", index=False)
-    judged = groundstation.open(GOOD, reference=tmp_path / "reference.csv")
-    assert judged.reference().to_frame("errors")["subject"].tolist()[0] == "gnss"
+    judged = groundstation.open(SHORT, reference=tmp_path / "reference.csv")
+    assert isinstance(judged, OpenLog) and judged.reference().to_frame("errors")["subject"].tolist()[0] == "gnss"
     again = judged.with_settings(heading={"taxi_speed_min_mps": 7.0})
-    assert again.reference().reference == judged.reference().reference
+    assert again.configuration.references == judged.configuration.references and again.flight is judged.flight
     with pytest.raises(UsageError, match="no such file"):
-        groundstation.open(GOOD, reference=tmp_path / "none.csv")
+        groundstation.open(SHORT, reference=tmp_path / "none.csv")
     with pytest.raises(UsageError, match="settings for saved results"):
-        groundstation.open(flight.save(tmp_path / "out").folder, reference=tmp_path / "reference.csv")
+        groundstation.open(fleet.flight(fleet["flight_id"][0]).folder, reference=tmp_path / "reference.csv")
 
 
 @pytest.fixture(scope="module")

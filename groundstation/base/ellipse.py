@@ -71,7 +71,7 @@ def fits(side_m: float, half_m: FloatArray) -> BoolArray:
 
 
 def told_ellipses(which: str, larger: int, left_out: int) -> str:
-    """Return the sentence of a caption on ellipses: enlarged how many times, how many not drawn.
+    """Return the sentence of a caption on ellipses: how enlarged, how many not drawn.
 
     Examples
     --------

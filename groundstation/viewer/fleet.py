@@ -18,6 +18,7 @@ from groundstation.viewer.fleet_charts import (
     ChartedAircraft,
     aircraft_of,
     by_aircraft,
+    is_judged,
     log_aircraft,
     verdicts,
 )
@@ -72,25 +73,34 @@ def send_fleet(stream: rr.RecordingStream, fleet: FleetResults, systems: Systems
     return layout
 
 
-def _logged(recorder: FleetRecorder, fleet: FleetResults, one: ChartedAircraft) -> Logged:
-    return one, log_aircraft(recorder, fleet, one)
+def _logged(recorder: FleetRecorder, fleet: FleetResults, one: ChartedAircraft) -> Logged | None:
+    """Log an aircraft; None for one that no flight judged or measured."""
+    views = log_aircraft(recorder, fleet, one)
+    return (one, views) if views or is_judged(fleet, one) else None
 
 
-def _fleet(recorder: FleetRecorder, fleet: FleetResults, found: list[Logged]) -> rrb.Container:
+def _fleet(recorder: FleetRecorder, fleet: FleetResults, found: list[Logged]) -> rrb.Container | None:
+    """Log what all aircraft have in common; None where there is neither a figure nor a table."""
     aircraft = [one for one, _ in found]
-    recorder.document("by_aircraft", aircraft_text(fleet, {one.name: one.entity for one in aircraft}, recorder.systems))
+    text = aircraft_text(fleet, {one.name: one.entity for one in aircraft}, recorder.systems)
+    judged = [one for one in aircraft if is_judged(fleet, one)]
     errors = by_aircraft([one for one, views in found if HEADING in views], HEADING)
-    plots = [*errors, *([verdicts(aircraft)] if aircraft else [])]
-    answer = [document("By aircraft", "by_aircraft"), *heading_error_density(recorder, fleet)]
-    columns = [rrb.Vertical(contents=answer)]
+    plots = [*errors, *([verdicts(judged)] if judged else [])]
+    answer = heading_error_density(recorder, fleet)
+    if text:
+        recorder.document("by_aircraft", text)
+        answer = [document("By aircraft", "by_aircraft"), *answer]
+    columns = [rrb.Vertical(contents=answer)] if answer else []
     if plots:
         columns.append(rrb.Vertical(contents=plots, row_shares=[3.0, 1.0][: len(plots)]))
+    if not columns:
+        return None
     return rrb.Horizontal(contents=columns, name="Fleet")
 
 
-def _aircraft(_recorder: FleetRecorder, _fleet: FleetResults, found: list[Logged]) -> rrb.Container | None:
+def _aircraft(_recorder: FleetRecorder, fleet: FleetResults, found: list[Logged]) -> rrb.Container | None:
     own = [
-        rrb.Vertical(contents=[*views.values(), verdicts([one])], name=one.label)
+        rrb.Vertical(contents=[*views.values(), *([verdicts([one])] if is_judged(fleet, one) else [])], name=one.label)
         for one, views in found[:MOST_AIRCRAFT]
     ]
     return rrb.Tabs(contents=own, name="Aircraft") if own else None

@@ -28,6 +28,7 @@ from groundstation.viewer.inner import forget_closed, send_blueprint
 from groundstation.viewer.names import clean_text
 from groundstation.viewer.properties import send_properties
 from groundstation.viewer.recorder import FLIGHT_TIME, Recorder
+from groundstation.viewer.saved_layout import send_layout_content
 from groundstation.viewer.tabs.generic import generic_tab
 from groundstation.viewer.tabs.log import log
 from groundstation.viewer.tabs.overview import overview
@@ -41,7 +42,7 @@ NamedTab = tuple[str, Callable[[], rrb.Container | None]]
 CONNECT_SECONDS = 3.0
 
 
-def write_recording(path: Path, flight: Flight, results: FlightResults, systems: Systems) -> None:
+def write_recording(path: Path, flight: Flight, results: FlightResults, systems: Systems, layout: bytes = b"") -> None:
     """Write the recording of one flight, blueprint embedded.
 
     Parameters
@@ -52,13 +53,15 @@ def write_recording(path: Path, flight: Flight, results: FlightResults, systems:
     results : FlightResults
     systems : Systems
         Those whose tabs it has.
+    layout : bytes
+        A saved layout in place of the default one; empty: none.
 
     Raises
     ------
     GroundstationError
         When Rerun refused the data or the file could not be written.
     """
-    save_stream(path, results.flight_id, lambda stream: send_flight(stream, flight, results, systems))
+    save_stream(path, results.flight_id, lambda stream: send_flight(stream, flight, results, systems, layout))
 
 
 def save_stream(path: Path, identity: str, send: Callable[[rr.RecordingStream], object]) -> None:
@@ -120,10 +123,12 @@ def _expect_viewer(url: str) -> None:
         ) from error
 
 
-def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResults, systems: Systems) -> rrb.Blueprint:
+def send_flight(
+    stream: rr.RecordingStream, flight: Flight, results: FlightResults, systems: Systems, layout: bytes = b""
+) -> rrb.Blueprint:
     """Log everything to a stream that has its sink, and return the layout.
 
-    The layout is sent first, and the call returns when all is out.
+    The layout is sent first, or a saved one in its place; the call returns when all is out.
     """
     held = HeldStream(stream)
     recorder = Recorder(held.stream, flight.start_ns, flight.has_utc, systems)
@@ -131,7 +136,8 @@ def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResul
     attempt("properties", "results", send_properties, stream, results)
     if flight.has_utc:
         stream.send_recording_start_time_nanos(flight.start_ns)
-    return send_tabs(stream, held, with_log(tabs_of(recorder, flight, results), recorder, flight, results))
+    tabs = with_log(tabs_of(recorder, flight, results), recorder, flight, results)
+    return send_tabs(stream, held, tabs, layout)
 
 
 def tabs_of(recorder: Recorder, flight: Flight, results: FlightResults) -> Iterator[NamedTab]:
@@ -142,7 +148,9 @@ def tabs_of(recorder: Recorder, flight: Flight, results: FlightResults) -> Itera
     yield "raw", partial(raw, recorder, flight, results)
 
 
-def with_log(tabs: Iterable[NamedTab], recorder: Recorder, flight: Flight, results: FlightResults) -> Iterator[NamedTab]:
+def with_log(
+    tabs: Iterable[NamedTab], recorder: Recorder, flight: Flight, results: FlightResults
+) -> Iterator[NamedTab]:
     """Tabs and, behind them, the log, which tells of those that failed and are left out."""
     yield from tabs
     yield "log", partial(_log, recorder, flight, results)
@@ -152,12 +160,17 @@ def _log(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Cont
     return log(recorder, flight, replace(results, findings=with_failures(results.findings, failures())))
 
 
-def send_tabs(stream: rr.RecordingStream, held: HeldStream, tabs: Iterable[NamedTab]) -> rrb.Blueprint:
-    """Let tabs log in their order, send the layout, then what they logged; returns the layout."""
+def send_tabs(
+    stream: rr.RecordingStream, held: HeldStream, tabs: Iterable[NamedTab], layout: bytes = b""
+) -> rrb.Blueprint:
+    """Let tabs log in their order, send the layout, then what they logged; returns their layout.
+
+    A saved ``layout`` is sent in its place.
+    """
     shown = [held.attempt("tab", name, tab) for name, tab in tabs]
-    layout = send_layout(stream, [tab for tab in shown if tab is not None])
+    own = send_layout(stream, [tab for tab in shown if tab is not None], saved=layout)
     held.release()
-    return layout
+    return own
 
 
 def answer_tabs(kind: type[Answer] | None, recorder: Recorder, results: FlightResults) -> Iterator[NamedTab]:
@@ -182,9 +195,12 @@ def _generic(names: Iterable[str], recorder: Recorder, results: FlightResults) -
 
 
 def send_layout(
-    stream: rr.RecordingStream, tabs: Sequence[rrb.Container], *, timeline: str = FLIGHT_TIME
+    stream: rr.RecordingStream, tabs: Sequence[rrb.Container], *, timeline: str = FLIGHT_TIME, saved: bytes = b""
 ) -> rrb.Blueprint:
-    """Send the layout of a recording: its panels are closed and its time stands still."""
+    """Send the layout of a recording, or a saved one; returns its own.
+
+    In its own, the panels are closed and time stands still.
+    """
     blueprint = rrb.Blueprint(
         rrb.Tabs(contents=tabs, active_tab=0),
         rrb.TimePanel(state="collapsed", timeline=timeline, play_state="paused"),
@@ -193,7 +209,10 @@ def send_layout(
         auto_layout=False,
         auto_views=False,
     )
-    send_blueprint(stream, blueprint)
+    if saved:
+        send_layout_content(stream, saved)
+    else:
+        send_blueprint(stream, blueprint)
     return blueprint
 
 

@@ -141,7 +141,7 @@ def errors(results: FlightResults) -> Plot | None:
 
 
 def errors_over_time(results: FlightResults) -> Plot | None:
-    """Return the same on linear axes, as a recording draws it: dead reckoning where it fits in."""
+    """Return the same on linear axes, for a recording: dead reckoning where it fits in."""
     return _errors(results, is_linear=True)
 
 
