@@ -11,7 +11,18 @@ DOCS, ROOT = HERE.parent, HERE.parent.parent
 BUILD = ROOT / "build" / "site"
 GROUP = re.compile(r"^\*\*(?P<title>[^*]+)\*\*(?P<links>.*\(.*\.md\).*)$", re.MULTILINE)
 LINK = re.compile(r"\[([^\]]+)\]\(([\w/-]+\.md)\)")
-OUTSIDE = re.compile(r"\[([^\]]+)\]\((\.\./(?!images)[^)]*|decisions/|notebooks/[^)]*|examples/[^)]*)\)")
+TO_A_FILE = re.compile(r"(?<!!)\[([^\]]+)\]\(([^)#:\s]+)(?:#[^)\s]*)?\)")
+OUTSIDE = re.compile(r"\[([^\]]+)\]\((\.\./(?!images)[^)]*|decisions/|notebooks/[^)]*)\)")
+
+
+def _linked(text: str, folder: Path) -> str:
+    """Return a page whose links to other pages of the site stay; of any other file only the text."""
+
+    def kept(link: re.Match[str]) -> str:
+        is_page = link[2].endswith(".md") and (folder / link[2]).is_file()
+        return link[0] if is_page else link[1]
+
+    return TO_A_FILE.sub(kept, text)
 
 
 def build() -> int:
@@ -24,7 +35,7 @@ def build() -> int:
     shutil.copytree(DOCS, source, ignore=shutil.ignore_patterns("site", "*.py", "*.ipynb"))
     shutil.copy(HERE / "conf.py", source / "conf.py")
     for path in source.rglob("*.md"):
-        path.write_text(OUTSIDE.sub(r"\1", path.read_text(encoding="utf-8")), encoding="utf-8")
+        path.write_text(_linked(path.read_text(encoding="utf-8"), path.parent), encoding="utf-8")
     made = pages()
     for name, text in made.items():
         (source / name).write_text(text, encoding="utf-8")
