@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 
 from groundstation.cli.completion import plans_of, scenarios, studies
 from groundstation.cli.main import app
+from tests.readers.logs_of_every_format import write_tlog
 from tests.readers.trajectory_writer import pos_rows
 
 ROOT = Path(__file__).parent.parent
@@ -229,6 +230,7 @@ def make_folder(folder: Path) -> None:
         f"2026/05/04 06:0{s // 60}:{s % 60:02d}.000 55.97 37.41 205.0 1 9 {'0.02 ' * 6}0 9 {'0 ' * 3}{'0.01 ' * 6}"
         for s in range(300)
     ]
+    write_tlog(folder / "flight.tlog")
     (folder / "reference.pos").write_bytes(pos_rows(rows))
     for line in (
         "simulate imu.toml --format ulog -o made",
