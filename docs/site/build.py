@@ -17,6 +17,7 @@ OUTSIDE = re.compile(r"\[([^\]]+)\]\((\.\./(?!images)[^)]*|decisions/|notebooks/
 def build() -> int:
     """Write the pages into a folder and let Sphinx make the site; the exit code is Sphinx's."""
     sys.path.insert(0, str(HERE))
+    from recording_page import page
     from reference import pages
 
     source = BUILD / "source"
@@ -25,7 +26,7 @@ def build() -> int:
     shutil.copy(HERE / "conf.py", source / "conf.py")
     for path in source.rglob("*.md"):
         path.write_text(OUTSIDE.sub(r"\1", path.read_text(encoding="utf-8")), encoding="utf-8")
-    made = pages()
+    made = {**pages(), "ref_recording.md": page()}
     for name, text in made.items():
         (source / name).write_text(text, encoding="utf-8")
     (source / "index.md").write_text(_index((source / "README.md").read_text(encoding="utf-8"), made), encoding="utf-8")
