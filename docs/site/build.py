@@ -43,11 +43,14 @@ def _index(listed: str, made: dict[str, str]) -> str:
     readme = (ROOT / "README.md").read_text(encoding="utf-8").replace("](docs/", "](")
     readme = re.sub(r"\]\(README\.md\)", "](genindex)", readme).split("## Reading on")[0]
     parts = [OUTSIDE.sub(r"\1", readme)]
+    decisions = sorted(f"decisions/{path.name}" for path in (DOCS / "decisions").glob("*.md"))
+    beside = {"Reference": list(made), "Contributing": decisions}
     for found in GROUP.finditer(listed):
         names = [name for _, name in LINK.findall(found["links"])]
-        parts.append(_tree(found["title"], names))
-    decisions = sorted(f"decisions/{path.name}" for path in (DOCS / "decisions").glob("*.md"))
-    return "\n".join([*parts, _tree("Reference from the code", list(made)), _tree("Decisions", decisions)])
+        parts.append(_tree(found["title"], names + beside.pop(found["title"], [])))
+    if beside:
+        raise SystemExit(f"docs/README.md has no group {', '.join(beside)}")
+    return "\n".join(parts)
 
 
 def _tree(title: str, names: list[str]) -> str:

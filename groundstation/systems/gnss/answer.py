@@ -261,6 +261,17 @@ class GnssReception(Answer, WordsOfRecord):
         return next(one for one in self.receivers if one.topic == self.main)
 
     @property
+    def against(self) -> str:
+        """First reason against the reception that the sentence does not tell; empty without one."""
+        reasons = self.reasons if self.grade in ("warn", "bad") else ()
+        return next((one for one in reasons if not one.startswith("RTK not fixed") and one not in self.sentence), "")
+
+    @property
+    def line(self) -> str:
+        """The sentence, behind what is against the reception."""
+        return "; ".join(filter(None, (self.against, self.sentence)))
+
+    @property
     def words_of_record(self) -> Mapping[str, str]:
         """Kind of fix that held most, where it is no ordinary one: "RTK fixed 65 %"."""
         if self.receiver.first_fix_s is None:

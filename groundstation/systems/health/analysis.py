@@ -12,7 +12,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.results.answer import Answers, answer_of
 from groundstation.systems.analysis import Analysis, Found, Shortfall
-from groundstation.systems.health.answer import AutopilotHealth, Check, Happening
+from groundstation.systems.health.answer import HEADLINES, AutopilotHealth, Check, Happening
 from groundstation.systems.health.columns import COLUMNS
 from groundstation.systems.health.settings import HealthSettings
 from groundstation.systems.known import Known
@@ -182,7 +182,7 @@ def _applies(flight: "Flight", _known: Known) -> bool:
 
 def _sentence(answers: Answers) -> str:
     answer = answer_of(answers, AutopilotHealth)
-    return "" if answer is None else f"autopilot health {answer.verdict.replace('_', ' ')}: {answer.sentence}"
+    return "" if answer is None else f"autopilot health {HEADLINES[answer.verdict].lower()}: {answer.sentence}"
 
 
 HEALTH = Analysis(

@@ -1,5 +1,6 @@
 """Answer of autopilot health: verdict of each check and of the flight."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
@@ -10,6 +11,7 @@ from groundstation.results.frames import Brief
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
 
 Verdict = Literal["pass", "warn", "fail", "not_logged"]
+HEADLINES: Mapping[Verdict, str] = {"pass": "Healthy", "warn": "Warnings", "fail": "Failed", "not_logged": "Not logged"}
 WHOLE_LOG = "in the whole log"  # what is judged where nothing says that it flew
 FIRST = ("gnss", "innovations", "vibration")  # checks that a flight's sentence and chapter always tell
 

@@ -302,6 +302,12 @@ class LandingResult(Answer):
     figures: tuple[FigureData, ...] = ()
 
     @property
+    def last(self) -> Approach | None:
+        """The last landing, or the last approach of a flight without one."""
+        landings = [one for one in self.approaches if one.outcome != "go-around"]
+        return next(reversed(landings or self.approaches), None)
+
+    @property
     def events(self) -> tuple[LandingEvent, ...]:
         """Events of all approaches in order of time: from the start of each to its end."""
         every = dict.fromkeys(one for made in self.approaches for one in _events(made))

@@ -74,7 +74,7 @@ def reference(results: FlightResults) -> Section | None:
 def _claim(answer: ReferenceResult) -> Claim:
     if not answer.is_judge:
         headline = f"the reference judges nothing: {typeset(answer.reason)}"
-        return Claim(Rank.REFERENCE, Mark("unknown", "Not judged"), headline, remark="the reference judges nothing")
+        return Claim(Rank.OTHER, Mark("unknown", "Not judged"), headline, remark="the reference judges nothing")
     rows = [row for row in answer.errors if row.axis in ("horizontal", "heading") and row.quantity != "velocity"]
     figures = tuple((_name(row), _of(row, row.spread.rmse, unit=True), _around(row)) for row in rows)
     sure = [row for row in answer.claims if row.state == "too_sure"]
