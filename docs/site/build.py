@@ -11,7 +11,7 @@ DOCS, ROOT = HERE.parent, HERE.parent.parent
 BUILD = ROOT / "build" / "site"
 GROUP = re.compile(r"^\*\*(?P<title>[^*]+)\*\*(?P<links>.*\(.*\.md\).*)$", re.MULTILINE)
 LINK = re.compile(r"\[([^\]]+)\]\(([\w/-]+\.md)\)")
-OUTSIDE = re.compile(r"\[([^\]]+)\]\((\.\./(?!images)[^)]*|decisions/|notebooks/[^)]*)\)")
+OUTSIDE = re.compile(r"\[([^\]]+)\]\((\.\./(?!images)[^)]*|decisions/|notebooks/[^)]*|examples/[^)]*)\)")
 
 
 def build() -> int:
