@@ -79,9 +79,13 @@ schemas: $(DEV) ## make the package's descriptor set from schemas/*.proto, schem
 		--descriptor_set_out=groundstation/store/descriptors.binpb schemas/*.proto
 	$(BIN)/python -m groundstation.pipeline.verbs.schema schemas/summary.schema.json schemas/installations.schema.json
 
-bench: $(RUNTIME) ## benchmarks against peers, printed as ratios
-	$(PIP) -e '.[bench]'
-	for file in benchmarks/bench_*.py; do $(BIN)/python $$file || exit 1; done
+# A peer that cannot be installed is "not measured". ROUNDS=3: quick, the table is printed and nothing published.
+bench: $(RUNTIME) ## benchmarks against peers into docs/evidence/benchmarks.md; WHAT="ulog store": parts; ROUNDS=3: quick
+	-$(PIP) -e '.[bench]'
+	rm -f build/bench/*.json
+	$(BIN)/python -m benchmarks $(WHAT)
+	$(BIN)/python -m benchmarks.table $(if $(ROUNDS),--print) build/bench/*.json
+	$(if $(ROUNDS),,$(BIN)/python -m benchmarks.trend build/bench/*.json)
 
 TOOLS := build/tools
 COMPILE := $(TOOLS)/bin/uv pip compile pyproject.toml --universal --python-version 3.11 --no-emit-index-url --quiet

@@ -1,23 +1,23 @@
 """The reader of bags and telemetry against rosbags, mcap-ros2-support and pymavlink, in one run.
 
 Both sides read every value of every message of a simulated robot: ours into columns (two passes, raw and canonical),
-theirs into one object a message. Processor seconds, best of several rounds that take turns.
+theirs into one object a message.
 """
 
 import argparse
 import tempfile
-import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
-from pymavlink import mavutil
-from rosbags.highlevel import AnyReader
-
+from benchmarks.record import ROUNDS, Book, Goal, by_turns
 from groundstation.base.records import RecordBatch
 from groundstation.readers import registry
 from groundstation.readers.bags.bag import METADATA
 from tests.readers.bag_writer import small_flight, write_ros1, write_ros2
 from tests.readers.telemetry_writer import telemetry
+
+TLOG_GOAL = Goal(10.0, "at least")
 
 
 def ours(path: Path) -> int:
@@ -29,6 +29,8 @@ def ours(path: Path) -> int:
 
 def by_rosbags(path: Path) -> int:
     """Messages that rosbags decodes."""
+    from rosbags.highlevel import AnyReader
+
     count = 0
     with AnyReader([path]) as reader:
         for connection, _time, data in reader.messages():
@@ -48,54 +50,40 @@ def by_mcap_ros2(path: Path) -> int:
 
 def by_pymavlink(path: Path) -> int:
     """Messages that pymavlink's own loop reads."""
+    from pymavlink import mavutil
+
     log, count = mavutil.mavlogfile(str(path)), 0
     while log.recv_msg() is not None:
         count += 1
     return count
 
 
-def best_of(rounds: int, *readers: tuple[Callable[[Path], int], Path]) -> list[tuple[float, int]]:
-    """Processor seconds and messages of each, taking turns."""
-    best = [(float("inf"), 0)] * len(readers)
-    for _ in range(rounds):
-        for number, (read, path) in enumerate(readers):
-            began = time.process_time()
-            count = read(path)
-            best[number] = min(best[number], (time.process_time() - began, count))
-    return best
-
-
 def main() -> None:
-    """Print one line for each container and peer."""
+    """Record each container beside each peer."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--rows", type=int, default=5_000, help="instants of the simulated robot")
-    parser.add_argument("--rounds", type=int, default=3)
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as name:
+    with Book("bags") as book, tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        flight, old_flight = small_flight(rows=options.rows), small_flight(is_ros1=True, rows=options.rows)
-        mcap, sqlite = write_ros2(folder / "mcap", flight), write_ros2(folder / "sqlite", flight, "sqlite3")
-        ros1, lz4 = write_ros1(folder / "a.bag", old_flight), write_ros1(folder / "b.bag", old_flight, "lz4")
         tlog = folder / "a.tlog"
         tlog.write_bytes(bytes(telemetry().data) * (options.rows // 50))
-        peers: list[tuple[str, str, Path, Callable[[Path], int]]] = [
-            ("ROS 2 MCAP", "rosbags", mcap, by_rosbags),
-            ("ROS 2 sqlite3", "rosbags", sqlite, by_rosbags),
-            ("ROS 1 bag", "rosbags", ros1, by_rosbags),
-            ("ROS 1 bag, lz4", "rosbags", lz4, by_rosbags),
-            ("tlog", "pymavlink", tlog, by_pymavlink),
-        ]
-        try:
-            import mcap_ros2  # noqa: F401
-        except ImportError:
-            print("mcap-ros2-support is not installed: left out")
-        else:
-            peers.append(("ROS 2 MCAP", "mcap-ros2-support", mcap, by_mcap_ros2))
-        for form, peer, path, read in peers:
-            (own_s, count), (peer_s, same) = best_of(options.rounds, (ours, path), (read, path))
+        forms: list[tuple[str, str, Path, Callable[[Path], int], Goal | None]] = []
+        if book.has("pymavlink"):
+            forms.append(("MAVLink telemetry", "pymavlink", tlog, by_pymavlink, TLOG_GOAL))
+        if book.has("rosbags"):  # it writes the bags too
+            flight, old_flight = small_flight(rows=options.rows), small_flight(is_ros1=True, rows=options.rows)
+            mcap, sqlite = write_ros2(folder / "mcap", flight), write_ros2(folder / "sqlite", flight, "sqlite3")
+            ros1, lz4 = write_ros1(folder / "a.bag", old_flight), write_ros1(folder / "b.bag", old_flight, "lz4")
+            bags = (("ROS 2 bag, MCAP", mcap), ("ROS 2 bag, sqlite3", sqlite), ("ROS 1 bag", ros1), ("ROS 1, lz4", lz4))
+            forms += [(form, "rosbags", path, by_rosbags, None) for form, path in bags]
+            if book.has("mcap-ros2-support"):
+                forms.append(("ROS 2 bag, MCAP", "mcap-ros2-support", mcap, by_mcap_ros2, None))
+        for form, peer, path, read, goal in forms:
+            count, same = ours(path), read(path)
             assert count == same, f"{count} messages, {same} by {peer}"
-            speed = f"{count / own_s / 1e3:.0f} thousand messages/s"
-            print(f"{form:15} {speed:30} {peer_s / own_s:5.1f} times {peer}")
+            times = by_turns({"ours": partial(ours, path), "peer": partial(read, path)}, ROUNDS)
+            what = f"{form} to batches, {count} messages"
+            book.against(what, times["ours"], times["peer"], peer, goal=goal, is_times=True)
 
 
 if __name__ == "__main__":

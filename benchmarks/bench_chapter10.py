@@ -1,8 +1,7 @@
 """The Chapter 10 reader against pychapter10, side by side in one run: MB/s, ratios, and peak memory.
 
 The same work on both sides: every packet, every message and word with its time, and the navigation messages decoded.
-Ours gives columns; pychapter10 gives objects, of which the navigation words are then taken. Figures are processor
-seconds, which other programs on the machine disturb least, best of several rounds that take turns. The log is the given
+Ours gives columns; pychapter10 gives objects, of which the navigation words are then taken. The log is the given
 recording, repeated with its counter and sequence numbers going on.
 """
 
@@ -12,20 +11,20 @@ import struct
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable
+from dataclasses import astuple
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from chapter10 import C10
-from recorded import LOGS, are_here
 
+from benchmarks.record import ROUNDS, Book, Goal, Times, by_turns
+from benchmarks.recorded import LOGS, are_here
 from groundstation.base.records import RecordBatch
 from groundstation.readers import registry
 from groundstation.readers.icd import Icd, load
 
 DATA = LOGS / "ch10"
-SPEED_GOAL_MB_S, TIMES_GOAL, DAMAGED_GOAL = 100.0, 10.0, 1.5
+SPEED_GOAL, TIMES_GOAL, DAMAGED_GOAL = Goal(100.0, "at least"), Goal(10.0, "at least"), Goal(1.5)
 DAMAGE_EVERY = 20_000  # bytes between flipped ones
 PEER_MB = 8  # of the log that the peer reads: it needs a second for each
 _PEAK = "{}\nprint(next(line.split()[1] for line in open('/proc/self/status') if line.startswith('VmHWM')))"
@@ -100,6 +99,8 @@ def ours(path: Path, icds: tuple[Icd, ...]) -> int:
 
 def peer(path: Path, icds: tuple[Icd, ...]) -> int:
     """The same by pychapter10: messages as it gives them, navigation words by struct; gives their number."""
+    from chapter10 import C10
+
     commands = {side for icd in icds for one in icd.messages_1553 for side in (one.transmit, one.receive) if side}
     found = 0
     with path.open("rb") as stream:
@@ -123,29 +124,6 @@ def _navigation(words: tuple[int, ...]) -> tuple[float, ...]:
     return (*angles, latitude, (longitude - 0x80000000) * 180.0 / 2**31, words[24] * 4 * 0.3048)
 
 
-class Work:
-    """Something to do again and again, and its best time."""
-
-    def __init__(self, do: Callable[[], object], megabytes: float) -> None:
-        self._do, self._megabytes = do, megabytes
-        self.seconds = float("inf")
-
-    def round(self) -> None:
-        """Do it once."""
-        processor = time.process_time()
-        self._do()
-        self.seconds = min(self.seconds, time.process_time() - processor)
-
-    @property
-    def speed_mb_s(self) -> float:
-        """Megabytes of file in a second."""
-        return self._megabytes / self.seconds
-
-    def line(self, name: str, note: str = "") -> str:
-        """One line of the report."""
-        return f"{name:40}{self.seconds:9.3f} s {self.speed_mb_s:9.1f} MB/s  {note}".rstrip()
-
-
 def peak_mb(path: Path, icd: Path) -> float:
     """Peak resident memory of a fresh interpreter that reads a log, MB."""
     code = (
@@ -158,53 +136,58 @@ def peak_mb(path: Path, icd: Path) -> float:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure and record."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "--log", type=Path, nargs="*", default=[DATA / "iliad_1553.c10", DATA / "kc135_429_1553_1MB.c10"]
     )
     parser.add_argument("--icd", type=Path, default=DATA / "icd" / "example_1553_egi.yaml")
-    parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--large-mb", type=int, default=0, help="also peak memory of a log of this size")
     options = parser.parse_args()
-    if not are_here(*options.log, options.icd):
-        return
-    icds, met = (load(options.icd),), True
-    with tempfile.TemporaryDirectory() as folder:
+    with Book("chapter10") as book, tempfile.TemporaryDirectory() as folder:
+        if not are_here(*options.log, options.icd):
+            book.not_measured("every figure", "no recorded log")
+            return
+        icds = (load(options.icd),)
         for log in options.log:
-            met &= _measured(log, icds, Path(folder), options.rounds)
+            measure(book, log, icds, Path(folder))
         if options.large_mb:
             data = options.log[0].read_bytes()
             for size_mb in (options.large_mb // 10, options.large_mb):
                 large = Path(folder) / "large.c10"
                 repeated(data, size_mb * 1_000_000 // len(data) + 1, large)
-                begin, size = time.perf_counter(), large.stat().st_size / 1e6
-                print(f"{size:.0f} MB: peak {peak_mb(large, options.icd):.0f} MB, {time.perf_counter() - begin:.1f} s")
+                size = large.stat().st_size / 1e6
+                book.figure(f"peak memory, Chapter 10 of {size:.0f} MB read", peak_mb(large, options.icd), "MB")
                 large.unlink()
-    goals = f"{SPEED_GOAL_MB_S:g} MB/s, {TIMES_GOAL:g} x pychapter10, damaged within {DAMAGED_GOAL:g} x"
-    print(f"goals ({goals}): {'met' if met else 'NOT met on this machine now'}")
 
 
-def _measured(log: Path, icds: tuple[Icd, ...], folder: Path, rounds: int) -> bool:
+def measure(book: Book, log: Path, icds: tuple[Icd, ...], folder: Path) -> None:
+    """Measure a recording, and record the figures."""
     data = log.read_bytes()
     paths = {name: folder / f"{name}.c10" for name in ("long", "short", "damaged")}
     repeated(data, 64, paths["long"])
     repeated(data, PEER_MB, paths["short"])
     paths["damaged"].write_bytes(damaged(paths["long"].read_bytes()))
     sizes = {name: path.stat().st_size / 1e6 for name, path in paths.items()}
-    works = {name: Work(lambda path=paths[name]: ours(path, icds), sizes[name]) for name in ("long", "damaged")}
-    works["peer"] = Work(lambda: peer(paths["short"], icds), sizes["short"])
-    samples = ours(paths["short"], icds)  # compiles
-    print(f"{log.name}, repeated to {sizes['long']:.0f} MB; {samples} navigation samples in {sizes['short']:.0f} MB")
-    for _ in range(rounds):
-        for work in works.values():
-            work.round()
-    ratio = works["damaged"].seconds / works["long"].seconds
-    times = works["long"].speed_mb_s / works["peer"].speed_mb_s
-    print(works["peer"].line(f"  pychapter10 ({sizes['short']:.0f} MB)"))
-    print(works["long"].line("  Chapter 10 -> tables", f"{times:.0f} times as fast as pychapter10"))
-    print(works["damaged"].line(f"  damaged every {DAMAGE_EVERY} bytes", f"{ratio:.2f} of the whole"))
-    return works["long"].speed_mb_s >= SPEED_GOAL_MB_S and times >= TIMES_GOAL and ratio <= DAMAGED_GOAL
+    works = {name: partial(ours, paths[name], icds) for name in ("long", "damaged")}
+    has_peer = book.has("pychapter10")
+    if has_peer:
+        works["peer"] = partial(peer, paths["short"], icds)
+    times = by_turns(works, ROUNDS)
+    what = f"Chapter 10 ({log.stem}) of {sizes['long']:.0f} MB to tables"
+    speeds = [sizes["long"] / one for one in times["long"].processor_s]
+    book.figure(what, speeds, "MB/s of processor time", goal=SPEED_GOAL)
+    if has_peer:
+        factor = sizes["long"] / sizes["short"]
+        as_long = Times(*(tuple(factor * one for one in side) for side in astuple(times["peer"])))
+        book.against(what, times["long"], as_long, "pychapter10", goal=TIMES_GOAL, is_times=True)
+    book.against(
+        f"{what}, damaged every {DAMAGE_EVERY} bytes",
+        times["damaged"],
+        times["long"],
+        "the good log",
+        goal=DAMAGED_GOAL,
+    )
 
 
 if __name__ == "__main__":

@@ -2,9 +2,8 @@
 
 Ten aircraft in a local frame, 70 states, every direction of every link once a second. filterpy runs the same extended
 filter: the same transition of each slot, the same range linearised at its own estimate, one scalar update after the
-other; places of dead reckoning are computed before its clock starts. Both sides take turns, warm, on the same 500 s;
-figures are processor seconds, best of several rounds, ratios those of the rounds; states and sigmas are compared before
-any ratio is printed.
+other; places of dead reckoning are computed before its clock starts. States and sigmas are compared before any ratio
+is recorded.
 
 Before, every algorithm on a session of three aircraft over 500 s. Then the number of aircraft: all hear all
 (centralised, neighbour taken as exact), and each hears two (every decentralised filter, without the error map, which is
@@ -13,8 +12,6 @@ a judge and no part of a filter).
 
 import argparse
 import os
-import time
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -26,6 +23,7 @@ from filterpy.kalman import ExtendedKalmanFilter  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 from scipy.linalg import block_diag  # noqa: E402
 
+from benchmarks.record import ROUNDS, Book, Goal, by_turns  # noqa: E402
 from groundstation.simulation.session import simulate_session  # noqa: E402
 from groundstation.simulation.session_scenario import (  # noqa: E402
     LinkSettings,
@@ -40,7 +38,8 @@ from groundstation.systems.cooperative.study.cases import CASES, settings_of  # 
 
 Array = NDArray[np.float64]
 SEED, AIRCRAFT, DURATION_S = 2010, 10, 500.0
-RATIO_GOAL, ROUNDS, OURS_A_ROUND, AGREE_SIGMAS = 1.0, 3, 1, 1e-6
+RATIO_GOAL, AGREE_SIGMAS = Goal(1.0, "at least"), 1e-6
+FEW_ROUNDS = 3  # of costs without a peer
 COUNTS = (2, 3, 5, 10, 15, 20)
 SESSIONS = ("ranked-points-turn", "three-two-satellites-turn")
 ALONE = ("neighbour_exact", "ranked", "split_intersection", "pairwise")
@@ -119,21 +118,8 @@ class Peer:
         return H
 
 
-def seconds_of(do: Callable[[], object], times: int = 1) -> float:
-    """Processor seconds of one of ``times`` calls."""
-    begin = time.process_time()
-    for _ in range(times):
-        do()
-    return (time.process_time() - begin) / times
-
-
-def best_of(do: Callable[[], object]) -> float:
-    """Least processor seconds of some calls."""
-    return min(seconds_of(do) for _ in range(ROUNDS))
-
-
-def against_filterpy() -> bool:
-    """Print how the centralised filter compares; True where the goal is met."""
+def against_filterpy(book: Book) -> None:
+    """Record how the centralised filter compares."""
     settings = CooperativeSettings(gate_sigma=0.0, derivatives="estimate", output_step_s=10.0)
     prepared = prepared_of(session(AIRCRAFT, DURATION_S, 1.0), settings)
     ends = np.searchsorted(prepared.events.time_s, DURATION_S)
@@ -145,56 +131,46 @@ def against_filterpy() -> bool:
     ours = np.concatenate([track.state[-1] for track in run.tracks])
     spread = np.concatenate([np.sqrt(np.diag(track.covariance[-1])) for track in run.tracks])
     apart = max(float(np.abs((ours - x) / sigma).max()), float(np.abs(spread / sigma - 1.0).max()))
-    own_run = partial(run_algorithm, prepared, settings, "centralised")
-    rounds = np.array([(seconds_of(peer.run), seconds_of(own_run, OURS_A_ROUND)) for _ in range(ROUNDS)])
-    theirs, own = rounds.min(axis=0)
-    ratios = np.sort(rounds[:, 0] / rounds[:, 1])
+    assert apart <= AGREE_SIGMAS, f"{apart:.1e} sigma apart"
+    times = by_turns({"ours": partial(run_algorithm, prepared, settings, "centralised"), "peer": peer.run}, ROUNDS)
     ranges = len(prepared.events.time_s)
-    each_us = 1e6 * rounds.min(axis=0) / ranges
-    print(
-        f"centralised, {AIRCRAFT} aircraft, 70 states, 1 Hz, {DURATION_S:g} s, {ranges} ranges: "
-        f"filterpy {theirs:.2f} s ({each_us[0]:.0f} us a range), ours {own:.3f} s ({each_us[1]:.1f} us); "
-        f"{np.median(ratios):.0f} times as fast ({ratios[0]:.0f} to {ratios[-1]:.0f} of {ROUNDS} rounds), "
-        f"{apart:.0e} sigma apart",
-        flush=True,
-    )
-    return bool(np.median(ratios) >= RATIO_GOAL and apart <= AGREE_SIGMAS)
+    what = f"centralised filter of {AIRCRAFT} aircraft, 70 states, 1 Hz, {DURATION_S:g} s, {ranges} ranges"
+    given = {"goal": RATIO_GOAL, "is_times": True, "note": f"{apart:.0e} sigma apart"}
+    book.against(what, times["ours"], times["peer"], "filterpy", **given)
 
 
-def against_number() -> None:
-    """Print the cost of every filter for more and more aircraft."""
+def against_number(book: Book) -> None:
+    """Record the cost of every filter for more and more aircraft."""
     settings = CooperativeSettings(gate_sigma=0.0, output_step_s=10.0, map_window_s=0.0)
-    print(
-        "   k   centralised, all hear all: us a range | each hears two, us an aircraft and frame: " + ", ".join(ALONE)
-    )
     for count in COUNTS:
         everybody = prepared_of(session(count, 60.0, 2.0), settings)
         two = prepared_of(session(count, 120.0, 2.0, min(2, count - 1)), settings)
-        joint = best_of(partial(run_algorithm, everybody, settings, "centralised"))
-        costs = [best_of(partial(run_algorithm, two, settings, name)) / count / 60.0 for name in ALONE]
-        shown = "  ".join(f"{1e6 * cost:7.1f}" for cost in costs)
-        print(f"{count:4d}   {1e6 * joint / len(everybody.events.time_s):8.1f}   {shown}")
-
-
-def of_a_session() -> None:
-    """Print the cost of every algorithm on a session of three aircraft, in the plane and on the globe."""
-    for name in SESSIONS:
-        scenario = load_session(name)
-        settings = settings_of(scenario, CASES[0])
-        prepared = prepared_of(scenario, settings)
-        costs = {one: seconds_of(partial(run_algorithm, prepared, settings, one)) for one in ALGORITHMS}
-        shown = ", ".join(f"{one} {cost:.2f}" for one, cost in costs.items())
-        print(f"{name}, {len(prepared.events.time_s)} measurements: {sum(costs.values()):.2f} s in all ({shown})")
+        works = {name: partial(run_algorithm, two, settings, name) for name in ALONE}
+        works["centralised"] = partial(run_algorithm, everybody, settings, "centralised")
+        times = by_turns(works, min(ROUNDS, FEW_ROUNDS))
+        ranges = len(everybody.events.time_s)
+        joint_us = [1e6 * one / ranges for one in times["centralised"].processor_s]
+        book.figure(f"centralised filter, all {count} aircraft hear all", joint_us, "us a range")
+        for name in ALONE:
+            each_us = [1e6 * one / count / 60.0 for one in times[name].processor_s]
+            book.figure(f"{name} filter, {count} aircraft, each hears two", each_us, "us an aircraft and frame")
 
 
 def main() -> None:
+    """Measure and record."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.parse_args()
-    of_a_session()
-    is_met = against_filterpy()
-    against_number()
-    goals = f"{RATIO_GOAL:g} times filterpy, same within {AGREE_SIGMAS:g} sigma"
-    print(f"goals ({goals}): {'met' if is_met else 'NOT met on this machine now'}")
+    with Book("cooperative") as book:
+        for name in SESSIONS:
+            scenario = load_session(name)
+            settings = settings_of(scenario, CASES[0])
+            prepared = prepared_of(scenario, settings)
+            works = {one: partial(run_algorithm, prepared, settings, one) for one in ALGORITHMS}
+            for one, times in by_turns(works, min(ROUNDS, FEW_ROUNDS)).items():
+                what = f"{one} filter on {name}, {len(prepared.events.time_s)} measurements"
+                book.figure(what, times.processor_s, "s")
+        against_filterpy(book)
+        against_number(book)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Speed of the session smoother, beside gtsam on the same graph.
 
-    python benchmarks/bench_cooperative_smoother.py [--session local-three-two-points] [--gtsam PYTHON]
+    python -m benchmarks.bench_cooperative_smoother [--session local-three-two-points] [--gtsam PYTHON]
 
 The whole smoother is timed first. Then the linear problem of its last pass is solved twice: by the smoother's chain and
 by gtsam (multifrontal Cholesky, COLAMD), one variable a vehicle and knot, one factor a reading. Both print seconds of
@@ -8,7 +8,7 @@ processor time on one thread for a solution and for a solution with the covarian
 apart. gtsam is no dependency: ``--gtsam`` names the Python of an environment of its own (``python -m venv E; E/bin/pip
 install gtsam``). Building its graph is not timed.
 
-    python benchmarks/bench_cooperative_smoother.py --runs 100 --seed 4711 [--session ...] [--silent 125 375] [--filter]
+    python -m benchmarks.bench_cooperative_smoother --runs 100 --seed 4711 [--session ...] [--silent 125 375] [--filter]
 
 flies a session many times and prints RMS error and NEES of the smoother over aircraft and time (after the first minute
 too), and the NEES of the first aircraft at start, middle and end with 99 % limits of so many runs; ``--silent``: no
@@ -18,7 +18,6 @@ point is heard between these seconds; ``--filter``: the centralised filter on th
 import argparse
 import os
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -87,7 +86,7 @@ def ours(session: str, seed: int) -> tuple[float, dict[str, np.ndarray], float, 
 
 
 def theirs(path: Path) -> None:
-    """Solve the linear problem of a file by gtsam, and print times and the largest difference."""
+    """Solve the linear problem of a file by gtsam; print two times and the largest differences."""
     import gtsam  # type: ignore[import-not-found]
 
     a = np.load(path)
@@ -132,8 +131,7 @@ def theirs(path: Path) -> None:
     sigma = np.sqrt(np.einsum("kvii->kvi", a["blocks"])).reshape(t, -1)
     apart = np.abs(step - a["step"]) / sigma
     other = np.abs(np.sqrt(np.einsum("kvii->kvi", blocks)).reshape(t, -1) / sigma - 1.0)
-    print(f"gtsam: solution {solve_s:.3f} s, with covariances {both_s:.3f} s")
-    print(f"apart: states {apart.max():.1e} sigma, sigmas {other.max():.1e} of them")
+    print(solve_s, both_s, apart.max(), other.max())
 
 
 def _unit(gtsam: object, n: int) -> object:
@@ -200,16 +198,25 @@ def main() -> None:
         for algorithm in ("smoothed", *(("centralised",) if arguments.filter else ())):
             honesty(arguments.session, arguments.runs, arguments.seed, tuple(arguments.silent), algorithm)
         return
-    whole_s, arrays, solve_s, both_s = ours(arguments.session, arguments.seed)
-    print(f"smoother, all passes: {whole_s:.3f} s")
-    print(f"its chain: solution {solve_s:.3f} s, with covariances {both_s:.3f} s", flush=True)
-    if arguments.gtsam:
+    from benchmarks.record import Book  # not above: gtsam's Python has not what it imports
+
+    with Book("cooperative_smoother") as book:
+        whole_s, arrays, solve_s, both_s = ours(arguments.session, arguments.seed)
+        book.figure(f"smoother of {arguments.session}, all passes", whole_s, "s")
+        book.figure("its chain: solution", solve_s, "s")
+        book.figure("its chain: solution with covariances", both_s, "s")
+        if not arguments.gtsam:
+            book.not_measured("beside gtsam", "gtsam has an environment of its own: --gtsam PYTHON", "gtsam")
+            return
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "problem.npz"
             np.savez(path, **arrays)
-            subprocess.run([arguments.gtsam, __file__, "--solve", str(path)], check=True)
-    else:
-        print("gtsam: not asked for (--gtsam PYTHON)", file=sys.stderr)
+            solved = [arguments.gtsam, __file__, "--solve", str(path)]
+            told = subprocess.run(solved, check=True, capture_output=True, text=True).stdout
+        solve, both, states, sigmas = (float(word) for word in told.split())
+        apart = f"apart: states {states:.1e} sigma, sigmas {sigmas:.1e} of them"
+        book.figure("gtsam: solution", solve, "s", note=apart)
+        book.figure("gtsam: solution with covariances", both, "s", note=apart)
 
 
 if __name__ == "__main__":

@@ -1,19 +1,19 @@
 """DataFlash to tables and to MCAP against pymavlink's recv_msg loop; a damaged log against a good one; peak memory.
 
-Seconds are by the clock, best of several rounds in which ours and pymavlink take turns: other programs slow both.
+The longer logs are the recorded one, its data repeated.
 """
 
 import re
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from recorded import LOGS, are_here
 
+from benchmarks.record import ROUNDS, Book, Goal, Times, by_turns
+from benchmarks.recorded import LOGS, are_here
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.ordering import corrected
 from groundstation.integrity.survey import survey
@@ -25,8 +25,9 @@ from groundstation.readers.source import Source
 from groundstation.tables.assemble import flight_from_batches
 
 LONG_BYTES = (14_000_000, 60_000_000)
-PEERS = ("bare", "values")
 REPEATS = 4  # of ours in each round
+TABLES_GOAL, CONVERT_GOAL, DAMAGED_GOAL = Goal(25.0, "at least"), Goal(6.0, "at least"), Goal(1.5)
+LONG_ROUNDS = 3
 
 
 def repeated(source: Path, target: Path, size: int) -> None:
@@ -88,24 +89,6 @@ def by_pymavlink(path: Path, values: bool) -> int:
     return count
 
 
-def seconds_of(work: Callable[[], object], written: Path) -> float:
-    """Wall seconds of one run; the file it may write is new, as to free the blocks of an old one takes time too."""
-    written.unlink(missing_ok=True)
-    started = time.perf_counter()
-    work()
-    return time.perf_counter() - started
-
-
-def best_in_turns(works: dict[str, Callable[[], object]], written: Path, rounds: int) -> dict[str, float]:
-    """Shortest wall seconds of each work."""
-    best = dict.fromkeys(works, float("inf"))
-    for _ in range(rounds):
-        for name, work in works.items():
-            for _ in range(1 if name in PEERS else REPEATS):
-                best[name] = min(best[name], seconds_of(work, written))
-    return best
-
-
 def peak_mb(path: Path, work: str) -> float:
     """Peak resident memory of a process that reads a log (``read``) or converts it (``convert``)."""
     done = subprocess.run([sys.executable, __file__, work, str(path)], check=True, capture_output=True, text=True)
@@ -123,49 +106,71 @@ def child(work: str, path: Path) -> None:
     print(int(re.search(r"VmHWM:\s*(\d+) kB", status)[1]) / 1024)  # type: ignore[index]
 
 
-def report(path: Path, folder: Path, rounds: int) -> None:
-    """Print the figures of one log."""
-    records = to_tables(path)  # compiles
+def new_each_time(work: Callable[[], object], written: Path) -> Callable[[], object]:
+    """Return the work after its file is removed: to free the blocks of an old one takes time too."""
+
+    def do() -> object:
+        written.unlink(missing_ok=True)
+        return work()
+
+    return do
+
+
+def report(book: Book, path: Path, folder: Path, rounds: int) -> None:
+    """Record the figures of one log."""
     target, broken = folder / "x.mcap", folder / "broken.BIN"
     damaged(path, broken)
     works: dict[str, Callable[[], object]] = {
-        "bare": lambda: by_pymavlink(path, values=False),
-        "values": lambda: by_pymavlink(path, values=True),
         "read": lambda: list(read(Source(path))),
         "tables alone": lambda: to_tables(path, is_surveyed=False),
         "to tables": lambda: to_tables(path),
-        "convert": lambda: convert_log(open_log(path), target),
+        "convert": new_each_time(lambda: convert_log(open_log(path), target), target),
         "broken": lambda: to_tables(broken),
     }
-    best = best_in_turns(works, target, rounds)
-    print(f"{path.name}: {path.stat().st_size / 1e6:.1f} MB, {records} records")
-    print(f"  pymavlink recv_msg   {best['bare']:8.3f} s without its values, {best['values']:.3f} s with them")
-    for work, limit in (("read", ""), ("tables alone", ""), ("to tables", ", 20 wanted"), ("convert", ", 5 wanted")):
-        ratios = " and ".join(f"{best[peer] / best[work]:.1f}" for peer in PEERS)
-        print(f"  {work:20} {best[work]:8.3f} s, {ratios} times as fast{limit}")
-    share = best["broken"] / best["to tables"]
-    print(f"  damaged, to tables   {best['broken']:8.3f} s, {share:.2f} of the good log, 1.5 allowed")
+    repeats = dict.fromkeys(works, REPEATS)
+    has_peer = book.has("pymavlink")
+    if has_peer:
+        works["bare"] = lambda: by_pymavlink(path, values=False)
+        works["values"] = lambda: by_pymavlink(path, values=True)
+    times = by_turns(works, rounds, repeats)
+    log = f"DataFlash of {path.stat().st_size / 1e6:.0f} MB"
+    if has_peer:
+        beside_pymavlink(book, log, times)
+    book.against(f"{log}, damaged, to tables", times["broken"], times["to tables"], "the good log", goal=DAMAGED_GOAL)
     base = peak_mb(path, "nothing")
     for work in ("read", "convert"):
-        print(f"  peak memory, {work:7} {peak_mb(path, work):6.0f} MB ({base:.0f} MB before the log is opened)")
+        book.figure(f"peak memory, {log}, {work}", peak_mb(path, work), "MB", note=f"{base:.0f} MB of it the program")
+
+
+def beside_pymavlink(book: Book, log: str, times: dict[str, Times]) -> None:
+    """Record the figures beside the bare recv_msg loop, and beside the loop that reads its values."""
+    for work, what, goal in (
+        ("tables alone", "to tables without ledger", None),
+        ("to tables", "to tables with ledger", TABLES_GOAL),
+        ("convert", "to MCAP", CONVERT_GOAL),
+    ):
+        for peer, told, limit in (("bare", "recv_msg", goal), ("values", "recv_msg with its values", None)):
+            given = {"goal": limit, "is_times": True, "distribution": "pymavlink"}
+            book.against(f"{log} {what}", times[work], times[peer], f"pymavlink {told}", **given)
 
 
 def main() -> None:
-    """Print speeds and memory for the largest recorded flight and for long logs made from it."""
+    """Record speeds and memory for the largest recorded flight and for long logs made from it."""
     if len(sys.argv) > 2:
         child(sys.argv[1], Path(sys.argv[2]))
         return
     log = LOGS / "dataflash" / "TestLog2_REENCODED_plane.BIN"
-    if not are_here(log):
-        return
-    with tempfile.TemporaryDirectory() as folder:
+    with Book("dataflash") as book, tempfile.TemporaryDirectory() as folder:
+        if not are_here(log):
+            book.not_measured("every figure", "no recorded log")
+            return
         flight = Path(folder) / log.name
         flight.write_bytes(log.read_bytes())
-        report(flight, Path(folder), rounds=5)
+        report(book, flight, Path(folder), ROUNDS)
         for size in LONG_BYTES:
             long = Path(folder) / f"long_{size // 1_000_000}.BIN"
             repeated(flight, long, size)
-            report(long, Path(folder), rounds=2)
+            report(book, long, Path(folder), min(ROUNDS, LONG_ROUNDS))
 
 
 if __name__ == "__main__":

@@ -19,8 +19,8 @@ from pathlib import Path
 from unittest import mock
 
 import psutil
-from distributed import LocalCluster
 
+from benchmarks.record import Book, Goal
 from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.verbs.synthesis import simulate_to
@@ -28,6 +28,7 @@ from groundstation.pipeline.verbs.synthesis import simulate_to
 COMMAND = [sys.executable, "-m", "groundstation"]
 PDF = [one for one in sys.argv[1:] if one == "--pdf"]
 FLIGHTS, DAMAGED_SHARE, AIRCRAFT = 500, 0.03, 5
+ONE_GOAL, TWO_GOAL = Goal(300.0), Goal(1.9, "at least")  # of 500 flights; of two workers
 SCENARIOS = ("taxi-good", "taxi-short", "taxi-drift")
 KILLS, FLIGHTS_KILLED = 10, 20
 IDENTICAL = {".html", ".pdf", ".csv"}
@@ -79,8 +80,8 @@ def timed(arguments: list[str]) -> tuple[float, float, str]:
         return seconds, peak / 1e6, told.read().decode().strip().splitlines()[-1]
 
 
-def stages(logs: Path, root: Path, flights: int) -> None:
-    """Print processor seconds a flight by stage, in this process alone: everything, then results alone."""
+def stages(book: Book, logs: Path, root: Path, flights: int) -> None:
+    """Record processor seconds a flight by stage, in this process alone: everything, then results alone."""
     for name, only_results in (("everything", False), ("results alone", True)):
         started = time.process_time()
         with mock.patch("time.perf_counter", time.process_time):  # what outcomes tell is then processor time
@@ -91,8 +92,9 @@ def stages(logs: Path, root: Path, flights: int) -> None:
         for outcome in done:
             spent.update(outcome.times_s)
         spent["beside the flights"] = whole_s - sum(spent.values())
-        told = ", ".join(f"{stage} {seconds / flights:.3f}" for stage, seconds in spent.items())
-        print(f"{name}: {whole_s / flights:.2f} s of processor time a flight: {told}", flush=True)
+        book.figure(f"one of {flights} flights, {name}", whole_s / flights, "s")
+        for stage, seconds in spent.items():
+            book.figure(f"one of {flights} flights, {name}: {stage}", seconds / flights, "s")
 
 
 def largest_bytes(process: psutil.Process) -> int:
@@ -121,10 +123,9 @@ def different(one: Path, other: Path) -> list[str]:
     return sorted([*(names[0] ^ names[1]), *changed, *broken])
 
 
-def kills(logs: Path, whole: Path, root: Path) -> str:
-    """Kill a run at random moments, continue it each time, and compare it with one that was left alone."""
+def kills(logs: Path, out: Path) -> None:
+    """Kill a run at random moments, and continue it each time until it ends."""
     rng = random.Random(5)
-    out = root / "killed"
     command = [*COMMAND, "run", str(logs), "-o", str(out), "-j", "2", "-q", *PDF]
     for _ in range(KILLS):
         process = subprocess.Popen(command, start_new_session=True, stderr=subprocess.DEVNULL)
@@ -132,48 +133,52 @@ def kills(logs: Path, whole: Path, root: Path) -> str:
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
     subprocess.run(command, check=False, stderr=subprocess.DEVNULL)
-    changed = different(whole, out)
-    return "identical" if not changed else f"{len(changed)} files differ: {', '.join(changed[:5])}"
 
 
 def main() -> None:
-    """Print all figures."""
+    """Measure and record."""
     flights = next((int(one) for one in sys.argv[1:] if one.isdigit()), FLIGHTS)
-    with tempfile.TemporaryDirectory() as folder:
+    with Book("fleet") as book, tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
         size = make_logs(root / "logs", flights)
-        print(f"{flights} flights, {size / 1e6:.0f} MB, {DAMAGED_SHARE:.0%} damaged", flush=True)
-        if "stages" in sys.argv[2:]:
-            stages(root / "logs", root, flights)
+        if "stages" in sys.argv[1:]:
+            stages(book, root / "logs", root, flights)
             return
-        seconds = {}
-        for jobs in (1, 2):
-            arguments = ["run", str(root / "logs"), "-o", str(root / f"j{jobs}"), "-j", str(jobs), *PDF]
-            seconds[jobs], peak_mb, told = timed(arguments)
-            print(f"-j {jobs}    {seconds[jobs]:7.1f} s, largest process {peak_mb:.0f} MB; {told}", flush=True)
-        print(f"two workers {seconds[1] / seconds[2]:.2f} times as fast as one, 1.8 wanted")
-        print(f"-j 1 and -j 2: {different(root / 'j1', root / 'j2') or 'identical'}", flush=True)
-        again, _peak, _told = timed(["run", str(root / "logs"), "-o", str(root / "j2"), "-j", "2", *PDF])
-        print(f"again   {again:7.1f} s, nothing to do", flush=True)
+        workers(book, root, f"{flights} flights of {size / 1e6:.0f} MB, {DAMAGED_SHARE:.0%} damaged", flights)
+
+
+def workers(book: Book, root: Path, what: str, flights: int) -> None:
+    """Record runs with one and two workers, a cluster, and runs that were killed."""
+    logs, seconds = str(root / "logs"), {}
+    for jobs in (1, 2):
+        arguments = ["run", logs, "-o", str(root / f"j{jobs}"), "-j", str(jobs), *PDF]
+        seconds[jobs], peak_mb, told = timed(arguments)
+        goal = ONE_GOAL if jobs == 1 and flights == FLIGHTS else None
+        book.figure(f"{what}, -j {jobs}", seconds[jobs], "s by the clock", goal=goal, note=told)
+        book.figure(f"{what}, -j {jobs}, largest process", peak_mb, "MB")
+    same = different(root / "j1", root / "j2")
+    note = f"differ: {', '.join(same[:5])}" if same else "files identical"
+    book.figure(f"{what}, two workers", seconds[1] / seconds[2], "times as fast as one", goal=TWO_GOAL, note=note)
+    again, _peak, _told = timed(["run", logs, "-o", str(root / "j2"), "-j", "2", *PDF])
+    book.figure(f"{what}, again, nothing to do", again, "s by the clock")
+    if book.has("distributed"):
+        from distributed import LocalCluster
+
         with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-            arguments = [
-                "run",
-                str(root / "logs"),
-                "-o",
-                str(root / "dask"),
-                "--scheduler",
-                cluster.scheduler_address,
-                *PDF,
-            ]
-            dask_s, _peak, _told = timed(arguments)
-        print(f"Dask    {dask_s:7.1f} s with two workers, {dask_s / seconds[2]:.2f} of -j 2", flush=True)
-        print(f"Dask and -j 2: {different(root / 'dask', root / 'j2') or 'identical'}", flush=True)
-        few = root / "few"
-        few.mkdir()
-        for path in sorted((root / "logs").iterdir())[:FLIGHTS_KILLED]:
-            (few / path.name).write_bytes(path.read_bytes())
-        timed(["run", str(few), "-o", str(root / "whole"), "-j", "2", *PDF])
-        print(f"{KILLS} times killed and continued, {FLIGHTS_KILLED} flights: {kills(few, root / 'whole', root)}")
+            command = ["run", logs, "-o", str(root / "dask"), "--scheduler", cluster.scheduler_address, *PDF]
+            dask_s, _peak, _told = timed(command)
+        same = different(root / "dask", root / "j2")
+        note = f"differ: {', '.join(same[:5])}" if same else "files identical"
+        book.figure(f"{what}, Dask with two workers", dask_s / seconds[2], "of -j 2", note=note)
+    few = root / "few"
+    few.mkdir()
+    for path in sorted((root / "logs").iterdir())[:FLIGHTS_KILLED]:
+        (few / path.name).write_bytes(path.read_bytes())
+    timed(["run", str(few), "-o", str(root / "whole"), "-j", "2", *PDF])
+    kills(few, root / "killed")
+    count = len(different(root / "whole", root / "killed"))
+    killed = f"{FLIGHTS_KILLED} flights, {KILLS} times killed and continued: files that differ"
+    book.figure(killed, float(count), "files", goal=Goal(0.0))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """The fleet of 100 000 flights: leading process, one flight added, report, recording; with synthetic results.
 
-``python -m benchmarks.bench_fleet_store [FLIGHTS [months]]`` prints the figures; with ``months`` there is the dataset
+``python -m benchmarks.bench_fleet_store [FLIGHTS [months]]`` records the figures; with ``months`` there is the dataset
 alone, without flight folders.
 """
 
@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from benchmarks.record import Book
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.many_flights.fleet.index import write_index_of
 from groundstation.pipeline.many_flights.fleet.keys import FlightKeys, Key, month_of
@@ -110,13 +111,13 @@ def make_fleet(out: Path, templates: list[Path], flights: int, with_folders: boo
         put_month(out, month, table, FlightKeys.of(keys))
 
 
-def timed(what: str, work: Callable[[], Any]) -> Any:
-    """Do something; print its seconds, by the clock and of this process, and the largest this process has been."""
+def timed(book: Book, what: str, work: Callable[[], Any]) -> Any:
+    """Do something; record its seconds, by the clock and of this process, and the largest this process has been."""
     began, worked = time.perf_counter(), time.process_time()
     found = work()
     seconds, busy_s = time.perf_counter() - began, time.process_time() - worked
     peak_gb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    print(f"{what:<50}{seconds:8.1f} s by the clock {busy_s:8.1f} s busy {peak_gb:6.2f} GB", flush=True)
+    book.figure(what, seconds, "s by the clock", note=f"{busy_s:.1f} s of processor time; up to here {peak_gb:.2f} GB")
     return found
 
 
@@ -134,51 +135,52 @@ def one_more(out: Path, identity: str) -> None:
 
 
 def main() -> None:
-    """Print all figures."""
+    """Measure and record."""
     flights = int(sys.argv[1]) if len(sys.argv) > 1 else FLIGHTS
     with_folders = sys.argv[2:] != ["months"]
-    with tempfile.TemporaryDirectory() as folder:
+    with Book("fleet_store") as book, tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out"
         out.mkdir()
         templates = [
             save_flight(Path(folder), number, samples=1600, forecast=skill((1.0, 5.0, 10.0, 30.0, 60.0, 90.0)))
             for number in range(TEMPLATES)
         ]
-        timed(f"{TEMPLATES} flights read by a worker", lambda: refresh(Path(folder)))
+        timed(book, f"{TEMPLATES} flights read by a worker", lambda: refresh(Path(folder)))
         arguments = (out, templates, flights, with_folders)
         maker = multiprocessing.get_context("spawn").Process(target=make_fleet, args=arguments)
         maker.start()  # its memory is not that of the process that leads a run
         maker.join()
         if with_folders:
-            one_flight(out, templates, flights)
+            one_flight(book, out, templates, flights)
             found = scan(out)
         else:
-            keys = timed("keys", lambda: remembered(out))
+            keys = timed(book, "keys", lambda: remembered(out))
             found = Scan(out, keys, (), (), {})
         assert len(found) == len(found.fresh) == flights
-        together(out, found)
+        together(book, out, found)
 
 
-def one_flight(out: Path, templates: list[Path], flights: int) -> None:
+def one_flight(book: Book, out: Path, templates: list[Path], flights: int) -> None:
     """What a run does when a flight is gone, and when one comes."""
     last = identity_of(flights - 1, flights)
     write_index_of(out, ())
     shutil.rmtree(out / last)
-    timed("one flight gone", lambda: one_more(out, last))
+    timed(book, "one flight gone", lambda: one_more(out, last))
     (out / last).mkdir()
     shutil.copytree(templates[0], out / last, dirs_exist_ok=True)
-    timed("one flight added", lambda: one_more(out, last))
+    timed(book, "one flight added", lambda: one_more(out, last))
 
 
-def together(out: Path, found: Scan) -> None:
+def together(book: Book, out: Path, found: Scan) -> None:
     """What a run, ``report`` and users do with all flights."""
-    fleet, _problems = timed("fleet put together", lambda: write_fleet(out, found))
-    timed("summary.html", lambda: write_fleet_report(out, fleet, systems(), with_pdf=False))
-    timed("fleet.rrd", lambda: write_fleet_recording(out / "fleet.rrd", fleet, systems()))
+    fleet, _problems = timed(book, "fleet put together", lambda: write_fleet(out, found))
+    timed(book, "summary.html", lambda: write_fleet_report(out, fleet, systems(), with_pdf=False))
+    timed(book, "fleet.rrd", lambda: write_fleet_recording(out / "fleet.rrd", fleet, systems()))
     for name in ("summary.html", "fleet.rrd"):
-        print(f"{name:<50}{(out / name).stat().st_size / 1e6:8.1f} MB")
+        book.figure(f"{name} written", (out / name).stat().st_size / 1e6, "MB")
     files = list((out / "flights.parquet").iterdir())
-    print(f"{'flights.parquet':<50}{sum(one.stat().st_size for one in files) / 1e6:8.1f} MB in {len(files)} files")
+    size_mb = sum(one.stat().st_size for one in files) / 1e6
+    book.figure("flights.parquet written", size_mb, "MB", note=f"{len(files)} files")
     command = [sys.executable, "-m", "rerun", "rrd", "verify", str(out / "fleet.rrd")]
     checked = subprocess.run(command, check=False, capture_output=True)
     print(f"rerun rrd verify: {'passed' if checked.returncode == 0 else checked.stderr.decode()[-300:]}")

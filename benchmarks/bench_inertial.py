@@ -1,14 +1,14 @@
 """INS errors: filter and smoother against the same model in filterpy, the hindcast map, the forecast study.
 
 One flight of 16 000 epochs, two channels of six states, position and velocity measured at 1 Hz. filterpy predicts and
-updates channel by channel and smooths with its own rts_smoother. Both sides take turns, warm, and figures are processor
-seconds, best of several rounds; results are compared before any ratio is printed.
+updates channel by channel and smooths with its own rts_smoother. Results are compared before any ratio is recorded.
 """
 
 import argparse
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # one core: threads cost six-by-six products more than they give
@@ -17,6 +17,7 @@ import numpy as np  # noqa: E402
 from filterpy.kalman import KalmanFilter  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 
+from benchmarks.record import ROUNDS, Book, Goal, by_turns  # noqa: E402
 from groundstation.results.forecast_methods import FORECAST_METHODS  # noqa: E402
 from groundstation.systems.inertial.filter import (  # noqa: E402
     ChannelsRun,
@@ -32,9 +33,9 @@ from groundstation.systems.inertial.study.consistency import matched_run  # noqa
 from groundstation.systems.inertial.study.forecast import study_forecast  # noqa: E402
 
 EPOCHS = 16_000
-RATIO_GOAL, MAP_GOAL_S, STUDY_GOAL_S = 100.0, 1.0, 120.0
+RATIO_GOAL, MAP_GOAL, STUDY_GOAL = Goal(100.0, "at least"), Goal(1.0), Goal(300.0)
 STUDY_RUNS = 200
-ROUNDS, OURS_A_ROUND = 4, 5
+OURS_A_ROUND = 5
 GRID_S = 60.0
 AGREE_SIGMAS = 1e-6  # filterpy inverts unscaled covariances, metres beside 1e-13 rad/s^2
 
@@ -70,14 +71,6 @@ def by_us(run: ChannelsRun) -> tuple[ChannelsRun, SmoothedErrors]:
     return again, smooth(again)
 
 
-def seconds_of(do: Callable[[], object], times: int = 1) -> float:
-    """Processor seconds of one of ``times`` calls."""
-    begin = time.process_time()
-    for _ in range(times):
-        do()
-    return (time.process_time() - begin) / times
-
-
 def full_map(run: ChannelsRun, methods: Sequence[str] = tuple(FORECAST_METHODS)) -> int:
     """Errors from every minute's start to every minute's lead until the end of the flight, by some methods."""
     span_s = float(run.epochs.time_s[-1])
@@ -98,34 +91,33 @@ def largest_difference(run: ChannelsRun) -> float:
 
 
 def main() -> None:
+    """Measure and record."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=20, help="flights a case of the study (0: leave it out)")
+    parser.add_argument("--runs", type=int, default=0, help="flights a case of the study (0: leave it out)")
     runs = parser.parse_args().runs
     run = matched_run(1, 0, duration_s=EPOCHS - 1).run
-    apart = largest_difference(run)  # warms both sides up as well
-    full_map(run)
-    rounds = [
-        (seconds_of(lambda: by_filterpy(run)), seconds_of(lambda: by_us(run), OURS_A_ROUND)) for _ in range(ROUNDS)
-    ]
-    theirs, ours = (min(part) for part in zip(*rounds, strict=True))
-    print(f"filter and smoother, {EPOCHS} epochs, two channels: filterpy {theirs:.2f} s, ours {1e3 * ours:.1f} ms")
-    print(f"  {theirs / ours:.0f} times as fast; largest difference {apart:.1e} sigma")
-    errors = full_map(run)
-    mapped = min(seconds_of(lambda: full_map(run)) for _ in range(ROUNDS))
-    print(f"full hindcast map, {errors} errors of {len(FORECAST_METHODS)} methods: {mapped:.2f} s on one core")
-    alone = [method for method in FORECAST_METHODS if method != "noise_bank"]  # that one runs filters of its own
-    by_alone = min(seconds_of(lambda: full_map(run, alone)) for _ in range(ROUNDS))
-    print(f"  of {len(alone)} methods, without the bank of noise sets: {by_alone:.2f} s")
-    met = theirs / ours >= RATIO_GOAL and mapped <= MAP_GOAL_S and apart <= AGREE_SIGMAS
-    if runs:
-        begin, processor = time.perf_counter(), time.process_time()
-        study_forecast(runs=runs)
-        clock, cores = time.perf_counter() - begin, time.process_time() - processor
-        whole = clock * STUDY_RUNS / runs
-        print(f"study, {runs} flights a case: {clock:.0f} s ({cores:.0f} s of processor), {STUDY_RUNS}: {whole:.0f} s")
-        met &= whole <= STUDY_GOAL_S
-    goals = f"{RATIO_GOAL:g} times, map {MAP_GOAL_S:g} s, study {STUDY_GOAL_S:g} s, same within {AGREE_SIGMAS:g} sigma"
-    print(f"goals ({goals}): {'met' if met else 'NOT met on this machine now'}")
+    with Book("inertial") as book:
+        apart = largest_difference(run)
+        assert apart <= AGREE_SIGMAS, f"{apart:.1e} sigma apart"
+        alone = [method for method in FORECAST_METHODS if method != "noise_bank"]  # that one runs filters of its own
+        works = {
+            "ours": partial(by_us, run),
+            "peer": partial(by_filterpy, run),
+            "map": partial(full_map, run),
+            "alone": partial(full_map, run, alone),
+        }
+        times = by_turns(works, ROUNDS, {"ours": OURS_A_ROUND})
+        what = f"filter and smoother of INS errors, {EPOCHS} epochs, two channels of six states"
+        given = {"goal": RATIO_GOAL, "is_times": True, "note": f"{apart:.0e} sigma apart"}
+        book.against(what, times["ours"], times["peer"], "filterpy", **given)
+        for name, methods in (("map", len(FORECAST_METHODS)), ("alone", len(alone))):
+            book.figure(f"full hindcast map, {methods} methods", times[name].processor_s, "s", goal=MAP_GOAL)
+        if runs:
+            begin = time.perf_counter()
+            study_forecast(runs=runs)
+            whole_s = (time.perf_counter() - begin) * STUDY_RUNS / runs
+            note = f"from {runs} flights a case"
+            book.figure(f"study forecast, {STUDY_RUNS} flights", whole_s, "s by the clock", goal=STUDY_GOAL, note=note)
 
 
 if __name__ == "__main__":

@@ -2,15 +2,13 @@
 
 At every epoch a prediction, then scalar measurements of pairs of states one after the other, as ranges between
 aircraft are. filterpy predicts with full matrices and updates with one scalar at a time too, so both sides do the same
-estimate; they take turns, warm, and figures are processor seconds, best of several rounds. Results are compared before
-any ratio is printed.
+estimate. Results are compared before any ratio is recorded.
 """
 
 import argparse
 import os
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # one core on both sides
@@ -19,6 +17,7 @@ import numpy as np  # noqa: E402
 from filterpy.kalman import KalmanFilter  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 
+from benchmarks.record import ROUNDS, Book, by_turns  # noqa: E402
 from groundstation.methods.kalman.filter import (  # noqa: E402
     FilterRun,
     KeptArrays,
@@ -30,7 +29,6 @@ from groundstation.methods.kalman.transition import Transition  # noqa: E402
 
 Array = NDArray[np.float64]
 SEED = 1960
-ROUNDS = 4
 AGREE_SIGMAS = 1e-6
 # states of one block, blocks, epochs, measurements at each
 CASES = ((6, 1, 4000, 2), (14, 1, 2000, 4), (13, 10, 40, 20), (13, 20, 10, 40))
@@ -94,30 +92,23 @@ def by_filterpy(given: System) -> tuple[Array, Array]:
     return kalman.x, kalman.P
 
 
-def seconds_of(do: Callable[[], object]) -> float:
-    """Processor seconds of a call."""
-    begin = time.process_time()
-    do()
-    return time.process_time() - begin
-
-
 def main() -> None:
+    """Measure and record."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.parse_args()
-    for block, count, epochs, each in CASES:
-        given = system(block, count, epochs, each)
-        ours, (x, P) = by_us(given), by_filterpy(given)  # warms both sides up as well
-        sigma = np.sqrt(np.diag(P))
-        apart = float(np.max(np.abs(ours.x[-1, :, 0] - x) / sigma))
-        apart = max(apart, float(np.max(np.abs(np.sqrt(ours.record.variance[-1]) / sigma - 1.0))))
-        if apart > AGREE_SIGMAS:
-            raise SystemExit(f"{given.size} states: {apart:.1e} sigma apart, more than {AGREE_SIGMAS:g}")
-        rounds = [(seconds_of(lambda: by_filterpy(given)), seconds_of(lambda: by_us(given))) for _ in range(ROUNDS)]  # noqa: B023
-        theirs, own = (min(part) for part in zip(*rounds, strict=True))
-        print(
-            f"{given.size:4d} states, {epochs} epochs of {each} measurements: filterpy {1e6 * theirs / epochs:.0f} us, "
-            f"ours {1e6 * own / epochs:7.1f} us an epoch; {theirs / own:6.1f} times as fast, {apart:.0e} sigma apart"
-        )
+    with Book("kalman") as book:
+        for block, count, epochs, each in CASES:
+            given = system(block, count, epochs, each)
+            ours, (x, P) = by_us(given), by_filterpy(given)
+            sigma = np.sqrt(np.diag(P))
+            apart = float(np.max(np.abs(ours.x[-1, :, 0] - x) / sigma))
+            apart = max(apart, float(np.max(np.abs(np.sqrt(ours.record.variance[-1]) / sigma - 1.0))))
+            if apart > AGREE_SIGMAS:
+                raise SystemExit(f"{given.size} states: {apart:.1e} sigma apart, more than {AGREE_SIGMAS:g}")
+            times = by_turns({"ours": partial(by_us, given), "peer": partial(by_filterpy, given)}, ROUNDS)
+            what = f"Kalman core, {given.size} states, {epochs} epochs of {each} measurements"
+            note = f"{apart:.0e} sigma apart"
+            book.against(what, times["ours"], times["peer"], "filterpy", is_times=True, note=note)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """Whole processes, as a user types them: our verbs on logs of each format and size, beside the commands of peers.
 
 Every command is a new process; its wall seconds and its processor seconds (user and system) are those that the
-operating system counted. Commands of one log take turns, so that what else the machine does slows all alike; the
-median of several rounds is told. ``--against FOLDER`` measures another checkout of the package beside this one.
+operating system counted. Commands of one log take turns, so that what else the machine does slows all alike.
+``--against FOLDER`` measures another checkout of the package beside this one.
 ``--cold`` adds the first run on a new machine: nothing compiled yet.
 
 Logs are a recorded or simulated one: its beginning for the small, its data repeated, times going on, for the long.
@@ -11,7 +11,6 @@ Logs are a recorded or simulated one: its beginning for the small, its data repe
 import argparse
 import os
 import shutil
-import statistics
 import subprocess
 import sys
 import tempfile
@@ -20,12 +19,15 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bench_memory import ROOT, repeated_csv, repeated_dataflash, repeated_ulog
-from recorded import LOGS, are_here
-
+from benchmarks.bench_memory import ROOT, repeated_csv, repeated_dataflash, repeated_ulog
+from benchmarks.record import ROUNDS, Book, Goal, Times
+from benchmarks.recorded import LOGS, are_here
 from groundstation.base.units import NS_PER_S
 
+IMPORTS = "bare imports of numpy and pyarrow"
+SMALL_GOAL, DATAFLASH_GOAL, ULOG_GOAL = Goal(2.5), Goal(3.2), Goal(1.3)
 SIZES_KB = (20, 2_000, 15_000)  # and 60_000 by --sizes-kb
+SMALL_BYTES, LARGE_BYTES = 100_000, 5_000_000
 VERBS = ("info", "check", "convert")
 WHOLE_VERBS = ("run", "report", "view")  # minutes for a long log: asked for by name; report and view need the run
 SOURCES: dict[str, tuple[Path, Callable[[Path, Path, int], None]]] = {
@@ -70,12 +72,10 @@ class Timed:
                 self.why_not = f"code {process.returncode}: {said.read().decode(errors='replace').strip()[-100:]}"
         self.runs.append((wall_s, usage.ru_utime + usage.ru_stime))
 
-    def line(self) -> str:
-        """Median seconds of wall and processor, or why there are none."""
-        if self.why_not:
-            return f"  {self.name:34} {self.why_not}"
-        wall_s, processor_s = (statistics.median(of) for of in zip(*self.runs, strict=True))
-        return f"  {self.name:34} {wall_s:7.2f} s, {processor_s:6.2f} s of processor time"
+    @property
+    def times(self) -> Times:
+        """Seconds of its runs."""
+        return Times(tuple(processor for _, processor in self.runs), tuple(wall for wall, _ in self.runs))
 
 
 def make_log(suffix: str, size_kb: int, folder: Path) -> Path | None:
@@ -139,44 +139,64 @@ def commands(log: Path, work: Path, verbs: list[str], against: Path | None, *, i
     return found
 
 
-def measure(log: Path, options: argparse.Namespace) -> None:
-    """Run all commands on a log by turns and print their medians."""
+def measure(book: Book, what: str, log: Path, options: argparse.Namespace) -> None:
+    """Run all commands on a log by turns and record their medians, beside what bounds them."""
     with tempfile.TemporaryDirectory() as folder:
         timed = commands(log, Path(folder), options.verbs, options.against, is_alone=options.no_peers)
+        bare = Timed(IMPORTS, [sys.executable, "-c", "import numpy, pyarrow"], without_bytecode_switch())
+        timed.append(bare)
         if options.cold:
             for one in timed:
                 cold = Timed(f"{one.name}, cold", one.command, {**one.environment, "NUMBA_CACHE_DIR": f"{folder}/new"})
                 if one.environment.get("PYTHONPATH"):
                     shutil.rmtree(f"{folder}/new", ignore_errors=True)
                     cold.run()
-                    print(cold.line())
+                    book.figure(f"{cold.name}, {what}", cold.times.processor_s, "s")
         for turn in range(options.rounds + 1):
             for one in timed:
                 one.run()
                 if turn == 0:
                     one.runs.clear()  # filled the caches
     for one in timed:
-        print(one.line())
+        if one.why_not:
+            book.not_measured(f"{one.name}, {what}", one.why_not)
+        elif one is not bare:
+            goal = goal_of(one.name, log)
+            book.against(f"{one.name}, {what}", one.times, bare.times, IMPORTS, goal=goal)
+    parse = next((one for one in timed if one.name == "pyulog: parse" and not one.why_not), None)
+    ours = next((one for one in timed if one.name == "groundstation convert" and not one.why_not), None)
+    if parse is not None and ours is not None and log.stat().st_size > LARGE_BYTES:
+        given = {"distribution": "pyulog", "goal": ULOG_GOAL, "by_clock": True}
+        book.against(f"groundstation convert, {what}", ours.times, parse.times, "process with pyulog's parse", **given)
+
+
+def goal_of(name: str, log: Path) -> Goal | None:
+    """Return the goal of a command, of bare imports."""
+    size = log.stat().st_size
+    if name != "groundstation convert" or size > LARGE_BYTES:
+        return None
+    return SMALL_GOAL if size < SMALL_BYTES else DATAFLASH_GOAL if log.suffix == ".BIN" else None
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure and record."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--formats", nargs="+", default=[*SOURCES, "mcap"], metavar="SUFFIX")
     parser.add_argument("--sizes-kb", nargs="+", type=int, default=SIZES_KB, metavar="KB")
     parser.add_argument("--verbs", nargs="+", default=list(VERBS), help=f"of {', '.join((*VERBS, *WHOLE_VERBS))}")
     parser.add_argument("--no-peers", action="store_true", help="our verbs alone")
-    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--rounds", type=int, default=ROUNDS)
     parser.add_argument("--cold", action="store_true", help="also with nothing compiled")
     parser.add_argument(
         "--against", type=lambda text: Path(text).resolve(), help="another checkout, measured beside this one"
     )
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
+    with Book("process") as book, tempfile.TemporaryDirectory() as folder:
         for suffix in options.formats:
             for size_kb in options.sizes_kb:
                 log = make_log("csv" if suffix == "mcap" else suffix, size_kb, Path(folder))
                 if log is None:
+                    book.not_measured(f".{suffix}", "no recorded log")
                     break
                 if suffix == "mcap":
                     target, csv = log.with_suffix(".mcap"), log
@@ -184,8 +204,7 @@ def main() -> None:
                     subprocess.run(command, env=os.environ | {"PYTHONPATH": str(ROOT)}, check=True)
                     csv.unlink()
                     log = target
-                print(f"{suffix}, {log.stat().st_size / 1e6:.2f} MB", flush=True)
-                measure(log, options)
+                measure(book, f".{suffix} of {size_kb} kB", log, options)
                 log.unlink()
 
 

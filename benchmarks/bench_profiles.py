@@ -1,23 +1,22 @@
 """Tables read by a profile against the same table as a flat CSV, by turns in one run: ratios of processor time.
 
 Every table has the same rows and columns; they differ in how cells are parted, in units, and in how angles are written.
-Figures are processor seconds, best of several rounds that take turns; the seconds by the clock stand beside.
 """
 
 import argparse
-import sys
 import tempfile
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.record import ROUNDS, Book, Goal, by_turns
 from groundstation.base.records import RecordBatch
 from groundstation.readers import registry
 
-ROWS, ROUNDS, GOAL = 100_000, 7, 1.1
+ROWS, GOAL = 100_000, Goal(1.1)
 # Name in the profile, field, unit of the profile, format of the cells.
 COLUMNS = (
     ("Lat", "ins.latitude_deg", "deg", "%.8f"),
@@ -200,42 +199,21 @@ def read(table: Table) -> int:
     return sum(len(one) * len(one.columns) for one in batches)
 
 
-def measure(group: Sequence[Table], rounds: int) -> list[tuple[Table, float, float]]:
-    """Best seconds of the processor and by the clock of each table, by turns."""
-    best = [(float("inf"), float("inf"))] * len(group)
-    for _round in range(rounds):
-        for at, table in enumerate(group):
-            began, clock = time.process_time(), time.perf_counter()
-            read(table)
-            took = time.process_time() - began, time.perf_counter() - clock
-            best[at] = min(best[at][0], took[0]), min(best[at][1], took[1])
-    return [(table, *seconds) for table, seconds in zip(group, best, strict=True)]
-
-
-def main() -> int:
-    """Print a line for each table; ends with 1 where one takes longer than the goal."""
+def main() -> None:
+    """Record the ratio of each table to the flat CSV of its group."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--rows", type=int, default=ROWS)
-    parser.add_argument("--rounds", type=int, default=ROUNDS)
     options = parser.parse_args()
-    worst = 0.0
-    with tempfile.TemporaryDirectory() as folder:
+    with Book("profiles") as book, tempfile.TemporaryDirectory() as folder:
         for group in tables(Path(folder), options.rows):
             counts = {read(table) for table in group}  # compiles, and fills what is kept
             assert len(counts) == 1, counts
-            measured = measure(group, options.rounds)
-            flat = measured[0][1:]
-            for table, processor_s, clock_s in measured:
-                ratio = processor_s / flat[0]
-                worst = max(worst, ratio)
-                print(
-                    f"{table.title:34} {table.log.stat().st_size / 1e6:6.1f} MB  {processor_s:6.3f} s, "
-                    f"{ratio:5.2f} of the flat CSV (by the clock {clock_s:6.3f} s, {clock_s / flat[1]:5.2f})",
-                    flush=True,
-                )
-    print(f"worst {worst:.2f}, goal {GOAL}")
-    return int(worst > GOAL)
+            times = by_turns({table.title: partial(read, table) for table in group}, ROUNDS)
+            flat, *others = group
+            for table in others:
+                what = f"table of {table.log.stat().st_size / 1e6:.0f} MB by a profile: {table.title}"
+                book.against(what, times[table.title], times[flat.title], flat.title, goal=GOAL)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

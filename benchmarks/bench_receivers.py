@@ -1,22 +1,18 @@
-"""Streams of receivers against pyubx2 and pynmeagps, which give one object a message; tables of everything from ours.
-
-Seconds are by the clock, best of several rounds in which ours and the peer take turns: other programs slow both.
-"""
+"""Streams of receivers against pyubx2 and pynmeagps: one object a message there, tables of everything here."""
 
 import logging
-import time
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
-from recorded import LOGS, are_here
-
+from benchmarks.record import ROUNDS, Book, Goal, by_turns
+from benchmarks.recorded import LOGS, are_here
 from groundstation.base.records import RecordBatch
 from groundstation.readers.receiver import read
 from groundstation.readers.source import Source
 
 STREAMS = ("walk_0827_gnss_1730.ubx", "pygpsdata_testobsdata.log", "inertialsense_Serial38400.nmea")
-ROUNDS = 3
-WANTED = 50
+GOAL = Goal(50.0, "at least")
+REPEATS = 5  # of ours in a round
 
 
 def by_peers(path: Path) -> int:
@@ -32,32 +28,22 @@ def by_groundstation(path: Path) -> int:
     return sum(len(item) for item in read(Source(path)) if isinstance(item, RecordBatch))
 
 
-def seconds_of(work: Callable[[Path], int], path: Path) -> float:
-    """Wall seconds of one run."""
-    started = time.perf_counter()
-    work(path)
-    return time.perf_counter() - started
-
-
 def main() -> None:
-    """Print speeds and their ratios."""
+    """Record the ratios."""
     logging.disable(logging.CRITICAL)  # complaints of the peers
-    for name in STREAMS:
-        path = LOGS / "gnss" / name
-        if not are_here(path):
-            continue
-        by_groundstation(path)  # compiles
-        best = {by_peers: float("inf"), by_groundstation: float("inf")}
-        for _round in range(ROUNDS):
-            for work in best:
-                for _again in range(1 if work is by_peers else 5):
-                    best[work] = min(best[work], seconds_of(work, path))
-        size_mb = path.stat().st_size / 1e6
-        theirs, ours = best[by_peers], best[by_groundstation]
-        print(
-            f"{name}: {size_mb:.1f} MB; peers {size_mb / theirs:.2f} MB/s, groundstation {size_mb / ours:.1f} MB/s: "
-            f"{theirs / ours:.0f} times as fast, {WANTED} wanted"
-        )
+    with Book("receivers") as book:
+        if not book.has("pyubx2", "pynmeagps"):
+            return
+        for name in STREAMS:
+            path = LOGS / "gnss" / name
+            if not are_here(path):
+                book.not_measured(name, "no recorded log")
+                continue
+            works = {"ours": partial(by_groundstation, path), "peer": partial(by_peers, path)}
+            times = by_turns(works, ROUNDS, {"ours": REPEATS})
+            peer = "pynmeagps" if path.suffix == ".nmea" else "pyubx2"
+            what = f"{path.suffix[1:]} stream of {path.stat().st_size / 1e6:.1f} MB to batches"
+            book.against(what, times["ours"], times["peer"], peer, goal=GOAL, is_times=True)
 
 
 if __name__ == "__main__":

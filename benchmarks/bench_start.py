@@ -1,30 +1,27 @@
 """Time to answer: `groundstation --help` in a new process, beside the bare interpreter."""
 
-import statistics
 import subprocess
 import sys
-import time
 
-REPEATS = 15
+from benchmarks.record import Book, Goal, by_turns
 
-
-def median_seconds(command: list[str]) -> float:
-    """Median wall time of a command, seconds, over REPEATS calls after one that fills the caches."""
-    times = []
-    for _ in range(REPEATS + 1):
-        started = time.perf_counter()
-        subprocess.run(command, check=True, capture_output=True)
-        times.append(time.perf_counter() - started)
-    return statistics.median(times[1:])
+ROUNDS = 15
+GOAL_MS = 300.0
 
 
 def main() -> None:
-    """Print both times and their ratio."""
-    bare = median_seconds([sys.executable, "-c", "pass"])
-    ours = median_seconds([sys.executable, "-m", "groundstation", "--help"])
-    print(
-        f"start   python -c pass {bare * 1e3:6.1f} ms   groundstation --help {ours * 1e3:6.1f} ms   {ours / bare:.1f} x"
-    )
+    """Measure both, and record."""
+    works = {
+        "bare": lambda: subprocess.run([sys.executable, "-c", "pass"], check=True),
+        "ours": lambda: subprocess.run(
+            [sys.executable, "-m", "groundstation", "--help"], check=True, capture_output=True
+        ),
+    }
+    with Book("start") as book:
+        times = by_turns(works, ROUNDS)
+        book.against("--help in a new process", times["ours"], times["bare"], "bare interpreter")
+        clock_ms = [1e3 * one for one in times["ours"].clock_s]
+        book.figure("--help by the clock", clock_ms, "ms", goal=Goal(GOAL_MS))
 
 
 if __name__ == "__main__":

@@ -1,14 +1,10 @@
 """The store against the mcap library with its protobuf decoder, side by side in one run: rows a second and ratios.
 
-A topic of ten double fields, random walks (whose last digits do not compress), checksums and indexes on. All that is
-measured runs in one thread; figures are rows per second of processor time, which other programs on the machine disturb
-least, best of several rounds that take turns; the rate by the clock stands beside.
+A topic of ten double fields, random walks (whose last digits do not compress), checksums and indexes on.
 """
 
 import argparse
 import tempfile
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +13,8 @@ from mcap.reader import make_reader
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
-from mcap_protobuf.decoder import DecoderFactory
 
+from benchmarks.record import ROUNDS, Book, Goal, Times, by_turns
 from groundstation.base.records import Column, RecordBatch
 from groundstation.store.info import StoreInfo
 from groundstation.store.reader import read
@@ -28,7 +24,8 @@ from groundstation.store.writer import ZSTD_LEVEL, StoreWriter
 FIELDS = tuple(field.name for field in canonical_type("ins").own_fields[:10])
 T0_NS, STEP_NS = 1_777_874_400_000_000_000, 10_000_000
 BATCH_ROWS = 65_536
-READ_GOAL_RATIO, READ_GOAL_ROWS, WRITE_GOAL_ROWS = 30.0, 3e6, 1e6
+READ_GOAL, ZSTD_GOAL = Goal(30.0, "at least"), Goal(1.3)
+READ_ROWS_GOAL, WRITE_ROWS_GOAL = Goal(3e6, "at least"), Goal(1e6, "at least")
 
 
 def batches_of(rows: int, share: float = 1.0) -> list[RecordBatch]:
@@ -64,6 +61,8 @@ def read_store(path: Path) -> dict[str, np.ndarray]:
 
 def read_peer(path: Path) -> dict[str, np.ndarray]:
     """The same columns through mcap and mcap_protobuf."""
+    from mcap_protobuf.decoder import DecoderFactory
+
     names = (*FIELDS, "device_time_ns", "record_index")
     rows: dict[str, list[float]] = {name: [] for name in ("time_ns", *names)}
     with path.open("rb") as file:
@@ -115,73 +114,59 @@ def compress(chunks: list[bytes]) -> None:
         compressor.compress(one)
 
 
-class Work:
-    """Something to do again and again, and its best rates, in rows per second of processor time and by the clock."""
-
-    def __init__(self, rows: int, do: Callable[[], object]) -> None:
-        self.rows, self._do = rows, do
-        self.rate = self.clock_rate = 0.0
-
-    def round(self) -> None:
-        """Do it once."""
-        clock, processor = time.perf_counter(), time.process_time()
-        self._do()
-        self.rate = max(self.rate, self.rows / (time.process_time() - processor))
-        self.clock_rate = max(self.clock_rate, self.rows / (time.perf_counter() - clock))
-
-    def line(self, name: str, peer: "Work | None" = None) -> str:
-        """One line of the report."""
-        ratio = f"{self.rate / peer.rate:6.1f} x peer" if peer else ""
-        return f"{name:36}{self.rate:12,.0f} rows/s (by the clock {self.clock_rate:12,.0f}) {ratio}".rstrip()
+def scaled(times: Times, rows: int, peer_rows: int) -> Times:
+    """Return times of the peer, who has fewer rows, as if it had as many."""
+    factor = rows / peer_rows
+    return Times(tuple(factor * one for one in times.processor_s), tuple(factor * one for one in times.clock_s))
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure and record."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rows", type=int, default=1_000_000)
     parser.add_argument("--peer-rows", type=int, default=50_000)
-    parser.add_argument("--rounds", type=int, default=6)
     options = parser.parse_args()
     batches, few = batches_of(options.rows), batches_of(options.peer_rows)
     gaps = batches_of(options.rows, share=0.9)
-    with tempfile.TemporaryDirectory() as folder:
+    with Book("store") as book, tempfile.TemporaryDirectory() as folder:
         full, small, sparse, other = (Path(folder) / f"{name}.mcap" for name in ("full", "small", "sparse", "other"))
-        works = {
-            "write": Work(options.rows, lambda: write_store(full, batches)),
-            "write peer": Work(options.peer_rows, lambda: write_peer(other, few)),
-            "read": Work(options.rows, lambda: read_store(full)),
-            "read peer": Work(options.peer_rows, lambda: read_peer(small)),
-            "write gaps": Work(options.rows, lambda: write_store(sparse, gaps)),
-            "read gaps": Work(options.rows, lambda: read_store(sparse)),
-        }
         write_store(small, few)
         write_store(full, batches)
+        write_store(sparse, gaps)
         chunks = chunks_of(full)
-        works["zstd"] = Work(options.rows, lambda: compress(chunks))
-        for _ in range(options.rounds):
-            for work in works.values():
-                work.round()
-        size = full.stat().st_size
-        ours, theirs = read_store(small), read_peer(small)
-        assert all(np.array_equal(ours[name], theirs[name]) for name in theirs), "both must read the same values"
-    read, read_peer_work, write = works["read"], works["read peer"], works["write"]
-    print(f"topic of {len(FIELDS)} double fields, {options.rows} rows, {size / options.rows:.0f} bytes a row")
-    print(read.line("MCAP -> tables, store", read_peer_work))
-    print(read_peer_work.line("MCAP -> tables, mcap + protobuf"))
-    print(write.line("tables -> MCAP, store", works["write peer"]))
-    print(works["write peer"].line("tables -> MCAP, mcap + protobuf"))
-    zstd = works["zstd"]
-    print(zstd.line("  zstd alone, the same chunks"))
-    shares = zstd.rate / write.rate, zstd.clock_rate / write.clock_rate
-    print(
-        f"  tables -> MCAP takes {shares[0]:.2f} times the processor time of zstd, {shares[1]:.2f} times by the clock"
-    )
-    print("a tenth of the values absent at random:")
-    print(works["read gaps"].line("MCAP -> tables, store"))
-    print(works["write gaps"].line("tables -> MCAP, store"))
-    met = read.rate >= max(READ_GOAL_RATIO * read_peer_work.rate, READ_GOAL_ROWS) and write.rate >= WRITE_GOAL_ROWS
-    goals = f"read {READ_GOAL_RATIO:.0f} x peer and {READ_GOAL_ROWS:,.0f} rows/s, write {WRITE_GOAL_ROWS:,.0f} rows/s"
-    print(f"goals ({goals}): {'met' if met else 'NOT met on this machine now'}")
+        works = {
+            "write": lambda: write_store(full, batches),
+            "read": lambda: read_store(full),
+            "write gaps": lambda: write_store(sparse, gaps),
+            "read gaps": lambda: read_store(sparse),
+            "zstd": lambda: compress(chunks),
+        }
+        if book.has("mcap-protobuf-support"):
+            works |= {"write peer": lambda: write_peer(other, few), "read peer": lambda: read_peer(small)}
+            ours, theirs = read_store(small), read_peer(small)
+            assert all(np.array_equal(ours[name], theirs[name]) for name in theirs), "both must read the same values"
+        times = by_turns(works, ROUNDS)
+        record(book, times, options.rows, options.peer_rows)
+
+
+def record(book: Book, times: dict[str, Times], rows: int, peer_rows: int) -> None:
+    """Record the figures."""
+    rates = {name: [rows / one for one in side.processor_s] for name, side in times.items()}
+    name = "mcap with protobuf"
+    for work, what, rows_goal, goal in (
+        ("read", "MCAP to tables", READ_ROWS_GOAL, READ_GOAL),
+        ("write", "tables to MCAP", WRITE_ROWS_GOAL, None),
+    ):
+        told = f"{what}, {len(FIELDS)} doubles a row"
+        book.figure(told, rates[work], "rows/s of processor time", goal=rows_goal)
+        if f"{work} peer" in times:
+            peer = scaled(times[f"{work} peer"], rows, peer_rows)
+            given = {"goal": goal, "is_times": True, "distribution": "mcap"}
+            book.against(f"{told}, {rows} rows", times[work], peer, name, **given)
+        book.figure(f"{what}, a tenth of the values absent", rates[f"{work} gaps"], "rows/s of processor time")
+    what = "tables to MCAP, of zstd alone on the same chunks"
+    book.against(what, times["write"], times["zstd"], "zstandard", goal=ZSTD_GOAL)
+    book.against(f"{what}, by the clock", times["write"], times["zstd"], "zstandard", by_clock=True)
 
 
 if __name__ == "__main__":

@@ -2,9 +2,8 @@
 
 All sides get the same increments, fixes, lever arm, start with the same errors, and noise of the unit's class. pyins
 and ours estimate position, velocity, attitude, biases, scale factors and misalignments (30 states), INSLIB position to
-biases (15). They take turns, warm, and figures are processor seconds, best of several rounds (pyins on an excerpt);
-INSLIB is called from a compiled loop, so that no Python is timed. "smoothed" is our filter with its smoother, "again" a
-further pass about what was smoothed.
+biases (15). pyins is timed on an excerpt; INSLIB is called from a compiled loop, so that no Python is timed. "smoothed"
+is our filter with its smoother, "again" a further pass about what was smoothed.
 
 Errors are those of whole logs, once a second in their second half (pyins, which takes minutes, on the first log alone).
 "squares" is the mean of squared errors over the variance that the filter states, 1 where its sigmas hold. Attitude is
@@ -16,7 +15,6 @@ Peers: ``pip install python-ins inslib`` (INSLIB is under the AGPL: for this com
 import argparse
 import ctypes
 import os
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -34,6 +32,7 @@ from pyins.measurements import NedVelocity, Position  # noqa: E402
 from pyins.strapdown import compute_increments_from_imu  # noqa: E402
 from scipy.linalg import rq  # noqa: E402
 
+from benchmarks.record import ROUNDS, Book, Goal, Times, by_turns  # noqa: E402
 from groundstation.base.angles import wrap_180  # noqa: E402
 from groundstation.base.attitude import rotation_n_from_b  # noqa: E402
 from groundstation.base.geodesy import curvature_radii_m  # noqa: E402
@@ -69,7 +68,6 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 DURATION_S = 300.0
 EXCERPT_S = 20.0  # timed of pyins
-ROUNDS = 3
 STEP_S = 0.1  # of the covariance, at pyins and INSLIB
 POSITION_SIGMA_M, VELOCITY_SIGMA_MPS = 1.0, 0.05
 # family, class of the unit, its rate and that of the fixes, Hz
@@ -79,6 +77,7 @@ CASES: tuple[tuple[Family, str, float, float], ...] = (
     ("uav", "mems", 250.0, 5.0),
     ("uav", "consumer", 250.0, 10.0),
 )
+PYINS_GOAL, INSLIB_GOAL, SMOOTHER_GOAL = Goal(100.0, "at least"), Goal(1.0, "at least"), Goal(3.0)
 POSITION_START_M, VELOCITY_START_MPS, LEVEL_START_DEG, HEADING_START_DEG = 1.0, 0.1, 1.0, 5.0
 
 
@@ -487,6 +486,7 @@ def errors_of(of: Given, found: Found) -> Array:
     )
 
 
+PARTS = (("position", 0, 3, "m"), ("velocity", 3, 6, "m/s"), ("tilt", 6, 8, "deg"), ("heading", 8, 9, "deg"))
 SIDES: dict[str, Callable[[Given], Side]] = {
     "pyins": by_pyins,
     "INSLIB": by_inslib,
@@ -496,53 +496,47 @@ SIDES: dict[str, Callable[[Given], Side]] = {
 }
 
 
-def seconds_of(do: Callable[[], object]) -> float:
-    """Processor seconds of a call."""
-    begin = time.process_time()
-    do()
-    return time.process_time() - begin
-
-
-def speeds(family: Family, name: str, rate_hz: float, fixes_hz: float) -> dict[str, float]:
-    """Samples per second of each side, best of the rounds, by turns."""
-    whole, excerpt = (given(family, name, rate_hz, fixes_hz, 1, length) for length in (DURATION_S, EXCERPT_S))
+def speeds(book: Book, what: str, case: tuple[Family, str, float, float]) -> None:
+    """Record how our filter compares in speed, and what the smoother and another pass add."""
+    whole, excerpt = (given(*case, 1, length) for length in (DURATION_S, EXCERPT_S))
     logs = {who: excerpt if who == "pyins" else whole for who in SIDES}
-    runs = {who: make(logs[who]).timed for who, make in SIDES.items()}
-    for run in runs.values():
-        run()
-    rounds = [{who: seconds_of(run) for who, run in runs.items()} for _ in range(ROUNDS)]
-    return {who: of.samples / min(one[who] for one in rounds) for who, of in logs.items()}
+    times = by_turns({who: make(logs[who]).timed for who, make in SIDES.items()}, ROUNDS)
+    for who, goal, package in (("pyins", PYINS_GOAL, "python-ins"), ("INSLIB", INSLIB_GOAL, "inslib")):
+        factor = whole.samples / logs[who].samples
+        peer = Times(*(tuple(factor * one for one in side) for side in (times[who].processor_s, times[who].clock_s)))
+        asked = {"goal": goal, "is_times": True, "distribution": package}
+        book.against(f"trajectory filter, {what}", times["ours"], peer, who, **asked)
+    for who, words in (("smoothed", "filter with smoother"), ("again", "another pass about the smoothed trajectory")):
+        book.against(f"{words}, {what}", times[who], times["ours"], "our filter alone", goal=SMOOTHER_GOAL)
+
+
+def errors(book: Book, what: str, case: tuple[Family, str, float, float], seeds: int) -> None:
+    """Record RMS errors of each side, and the mean of squared errors over the filter's own variance."""
+    logs = [given(*case, seed, DURATION_S) for seed in range(1, seeds + 1)]
+    for who, make in SIDES.items():
+        mine = logs[:1] if who == "pyins" else logs
+        parts = [(errors_of(of, found), found.sigma) for of, found in ((of, make(of).judged()) for of in mine)]
+        error, sigma = (np.concatenate(part) for part in zip(*parts, strict=True))
+        rms, squares = np.sqrt(np.mean(error**2, axis=0)), np.mean((error / sigma) ** 2, axis=0)
+        for name, at, end, unit in PARTS:
+            note = f"squares {np.mean(squares[at:end]):.2f}; {len(mine)} logs"
+            if who == "INSLIB" and name == "tilt":
+                note = f"{len(mine)} logs"  # its angles are others
+            rms_of = float(np.sqrt(np.sum(rms[at:end] ** 2)))
+            book.figure(f"RMS error of {name}, {who}, {what}", rms_of, unit, note=note)
 
 
 def main() -> None:
+    """Measure and record."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=10, help="logs of each case on which errors are judged")
-    parser.add_argument("--without", nargs="*", default=[], choices=SIDES, help="sides left out")
-    given_options = parser.parse_args()
-    for who in given_options.without:
-        del SIDES[who]
-    for family, name, rate_hz, fixes_hz in CASES:
-        print(f"{family}, {name} unit at {rate_hz:g} Hz, fixes at {fixes_hz:g} Hz", flush=True)
-        speed = speeds(family, name, rate_hz, fixes_hz)
-        if "ours" in speed:
-            beside = [f"{speed['ours'] / speed[who]:.3g} times {who}" for who in ("pyins", "INSLIB") if who in speed]
-            if "smoothed" in speed:
-                beside.append(f"with smoother {speed['ours'] / speed['smoothed']:.2f} times as long")
-            print(f"  our filter: {', '.join(beside)}", flush=True)
-        logs = [given(family, name, rate_hz, fixes_hz, seed, DURATION_S) for seed in range(1, given_options.seeds + 1)]
-        for who, make in SIDES.items():
-            mine = logs[:1] if who == "pyins" else logs
-            parts = [(errors_of(of, found), found.sigma) for of, found in ((of, make(of).judged()) for of in mine)]
-            error, sigma = (np.concatenate(part) for part in zip(*parts, strict=True))
-            rms, squares = np.sqrt(np.mean(error**2, axis=0)), np.mean((error / sigma) ** 2, axis=0)
-            place, velocity, tilt = (float(np.sqrt(np.sum(rms[at:end] ** 2))) for at, end in ((0, 3), (3, 6), (6, 8)))
-            tilt_squares = "" if who == "INSLIB" else f", {np.mean(squares[6:8]):.2f}"  # its angles are others
-            print(
-                f"  {who:8s} {speed[who]:9.0f} samples/s; position {place:.2f} m, squares {np.mean(squares[:3]):.2f}; "
-                f"velocity {velocity:.3f} m/s, {np.mean(squares[3:6]):.2f}; "
-                f"tilt {tilt:.2f} deg{tilt_squares}; heading {rms[8]:.2f} deg, {squares[8]:.2f}",
-                flush=True,
-            )
+    options = parser.parse_args()
+    with Book("trajectory") as book:
+        for case in CASES:
+            family, name, rate_hz, fixes_hz = case
+            what = f"{family}, {name} unit at {rate_hz:g} Hz, fixes at {fixes_hz:g} Hz"
+            speeds(book, what, case)
+            errors(book, what, case, options.seeds)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,7 @@
 """The ULog reader against pyulog, side by side in one run: seconds, ratios, and peak memory.
 
-All topics are read on both sides: ours raw and canonical, pyulog's as it offers them. Figures are processor seconds,
-which other programs on the machine disturb least, best of several rounds that take turns; the seconds by the clock
-stand beside. The 60 MB log is the given one with its data repeated, times shifted.
+All topics are read on both sides: ours raw and canonical, pyulog's as it offers them. The 57 MB log is the given one
+with its data repeated, times shifted.
 """
 
 import argparse
@@ -10,21 +9,20 @@ import struct
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from pyulog import ULog
-from recorded import LOGS, are_here
 
+from benchmarks.record import ROUNDS, Book, Goal, by_turns
+from benchmarks.recorded import LOGS, are_here
 from groundstation.base.records import Column, RecordBatch
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.readers import registry
 
 DEFAULT_LOG = LOGS / "ulog" / "Proto_FLT09_REENCODED_fixedwing.ulg"
-TABLES_GOAL, CONVERT_GOAL, DAMAGED_GOAL = 5.0, 1.0, 1.5
+TABLES_GOAL, CONVERT_GOAL, DAMAGED_GOAL = Goal(5.0, "at least"), Goal(0.5), Goal(1.5)
 REPEATS = 4
 DAMAGE_EVERY = 20_000  # bytes between flipped ones: some 700 damaged places in 14 MB
 _PEAK = "{}\nprint(next(line.split()[1] for line in open('/proc/self/status') if line.startswith('VmHWM')))"
@@ -79,25 +77,6 @@ def damaged(data: bytes) -> bytes:
     return bytes(out)
 
 
-class Work:
-    """Something to do again and again, and its best times, processor and clock."""
-
-    def __init__(self, do: Callable[[], object]) -> None:
-        self._do = do
-        self.seconds = self.clock_seconds = float("inf")
-
-    def round(self) -> None:
-        """Do it once."""
-        clock, processor = time.perf_counter(), time.process_time()
-        self._do()
-        self.seconds = min(self.seconds, time.process_time() - processor)
-        self.clock_seconds = min(self.clock_seconds, time.perf_counter() - clock)
-
-    def line(self, name: str, note: str = "") -> str:
-        """One line of the report."""
-        return f"{name:44}{self.seconds * 1e3:9.1f} ms (by the clock {self.clock_seconds * 1e3:9.1f})  {note}".rstrip()
-
-
 def peak_mb(code: str) -> float:
     """Peak resident memory of a fresh interpreter that runs ``code``, MB."""
     done = subprocess.run([sys.executable, "-c", _PEAK.format(code)], capture_output=True, text=True, check=True)
@@ -105,57 +84,55 @@ def peak_mb(code: str) -> float:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure and record."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--log", type=Path, default=DEFAULT_LOG)
-    parser.add_argument("--rounds", type=int, default=7)
     options = parser.parse_args()
-    if not are_here(options.log):
-        return
-    data = options.log.read_bytes()
-    with tempfile.TemporaryDirectory() as folder:
+    with Book("ulog") as book, tempfile.TemporaryDirectory() as folder:
+        if not are_here(options.log):
+            book.not_measured("every figure", "no recorded log")
+            return
+        data = options.log.read_bytes()
         paths = {name: Path(folder) / f"{name}.ulg" for name in ("whole", "long", "damaged")}
         for name, content in (("whole", data), ("long", repeated(data, REPEATS)), ("damaged", damaged(data))):
             paths[name].write_bytes(content)
-        target = Path(folder) / "out.mcap"
-        works = {}
-        for name in ("whole", "long"):
-            path = paths[name]
-            works[name, "pyulog"] = Work(lambda path=path: ULog(str(path)))
-            works[name, "tables"] = Work(lambda path=path: tables_of(path))
-            works[name, "convert"] = Work(lambda path=path: convert_log(open_log(path), target))
-        works["damaged", "tables"] = Work(lambda: tables_of(paths["damaged"]))
-        tables_of(paths["whole"])  # compiles
-        for _ in range(options.rounds):
-            for work in works.values():
-                work.round()
-        met = _report(works, paths)
-        _report_memory(paths)
-    goals = f"tables {TABLES_GOAL:g} x pyulog, convert within its parse, damaged within {DAMAGED_GOAL:g} x"
-    print(f"goals ({goals}): {'met' if met else 'NOT met on this machine now'}")
+        measure(book, paths, Path(folder) / "out.mcap")
 
 
-def _report(works: dict[tuple[str, str], Work], paths: dict[str, Path]) -> bool:
-    met = True
+def measure(book: Book, paths: dict[str, Path], target: Path) -> None:
+    """Measure the logs and record the figures."""
+    works: dict[str, Callable[[], object]] = {"damaged tables": lambda: tables_of(paths["damaged"])}
+    has_peer = book.has("pyulog")
     for name in ("whole", "long"):
-        peer, tables, convert = (works[name, what] for what in ("pyulog", "tables", "convert"))
-        print(f"{paths[name].stat().st_size / 1e6:.1f} MB")
-        print(peer.line("  pyulog, bare parse"))
-        print(tables.line("  ULog -> tables", f"{peer.seconds / tables.seconds:.1f} times as fast as pyulog"))
-        print(convert.line("  convert to MCAP", f"{convert.seconds / peer.seconds:.2f} of pyulog's parse"))
-        met &= peer.seconds >= TABLES_GOAL * tables.seconds and convert.seconds <= CONVERT_GOAL * peer.seconds
-    ratio = works["damaged", "tables"].seconds / works["whole", "tables"].seconds
-    print(works["damaged", "tables"].line(f"damaged every {DAMAGE_EVERY} bytes -> tables", f"{ratio:.2f} of the whole"))
-    return met and ratio <= DAMAGED_GOAL
+        path = paths[name]
+        works[f"{name} tables"] = lambda path=path: tables_of(path)  # type: ignore[misc]
+        works[f"{name} convert"] = lambda path=path: convert_log(open_log(path), target)  # type: ignore[misc]
+        if has_peer:
+            from pyulog import ULog
+
+            works[f"{name} pyulog"] = lambda path=path: ULog(str(path))  # type: ignore[misc]
+    times = by_turns(works, ROUNDS)
+    for name in ("whole", "long"):
+        size = f"{paths[name].stat().st_size / 1e6:.0f} MB"
+        if has_peer:
+            peer = times[f"{name} pyulog"]
+            goal = {"goal": TABLES_GOAL, "is_times": True}
+            book.against(f"ULog of {size} to tables, all topics", times[f"{name} tables"], peer, "pyulog", **goal)
+            convert = f"ULog of {size} to MCAP, of pyulog's bare parse"
+            book.against(convert, times[f"{name} convert"], peer, "pyulog", note="two threads, both counted")
+            by_clock = {"goal": CONVERT_GOAL, "by_clock": True}
+            book.against(f"{convert}, by the clock", times[f"{name} convert"], peer, "pyulog", **by_clock)
+        memory(book, paths[name], size, has_peer=has_peer)
+    what = f"ULog damaged every {DAMAGE_EVERY} bytes to tables"
+    book.against(what, times["damaged tables"], times["whole tables"], "the good log", goal=DAMAGED_GOAL)
 
 
-def _report_memory(paths: dict[str, Path]) -> None:
+def memory(book: Book, path: Path, size: str, *, has_peer: bool) -> None:
+    """Record peak memory of a process that reads a log, and pyulog's."""
     base = peak_mb(_PEAK_IMPORTS)
-    for name in ("whole", "long"):
-        path, size = str(paths[name]), paths[name].stat().st_size / 1e6
-        ours = peak_mb(f"{_PEAK_IMPORTS}\nfor item in registry.read({path!r}): pass")
-        theirs = peak_mb(f"from pyulog import ULog\nlog = ULog({path!r})")
-        print(f"{size:.1f} MB: peak {ours:.0f} MB ({base:.0f} MB of it the program), pyulog {theirs:.0f} MB")
+    ours = peak_mb(f"{_PEAK_IMPORTS}\nfor item in registry.read({str(path)!r}): pass")
+    theirs = f"; pyulog {peak_mb(f'from pyulog import ULog; log = ULog({str(path)!r})'):.0f} MB" if has_peer else ""
+    book.figure(f"peak memory, ULog of {size} read", ours, "MB", note=f"{base:.0f} MB of it the program{theirs}")
 
 
 if __name__ == "__main__":

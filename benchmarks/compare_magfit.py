@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from recorded import LOGS, are_here
 
+from benchmarks.recorded import LOGS, are_here
 from groundstation.integrity.ordering import corrected
 from groundstation.integrity.survey import survey
 from groundstation.readers.dataflash import read

@@ -11,8 +11,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from groundstation.base.version import __version__
 from groundstation.cli.main import app
 from groundstation.pipeline.verbs import synthesis
+from groundstation.pipeline.verbs.provenance import commit_of, this_machine, version_told
+from groundstation.pipeline.verbs.synthesis import EVIDENCE
 from groundstation.simulation.scenario import scenario_names
 from groundstation.systems import systems
 from groundstation.systems.study import StudyResult, section
@@ -132,10 +135,21 @@ def test_a_study_that_reads_files_has_them_and_no_other_does(tmp_path: Path, mon
     monkeypatch.setattr(synthesis, "systems", lambda: Systems((*systems().every, reading)))
     out = ("-o", str(tmp_path / "out"))
     assert groundstation("study", "read", "--input", str(tmp_path / "logs"), *out)[:2] == (0, "# logs read\n\n")
+    title, line = (tmp_path / "out" / EVIDENCE).read_text(encoding="utf-8").strip().split("\n\n")
+    assert title == "# logs read" and "\n" not in line
+    command = f"groundstation study read --runs 200 --seed 71 --input {tmp_path / 'logs'} -o DIR"
+    assert line.startswith(f"Made by `{command}`; {version_told()}; 20")
+    assert line.endswith(f" UTC; {this_machine()}.")
     code, _, told = groundstation("study", "read", "-o", str(tmp_path / "other"))
     assert code == 2 and "read without --input, expected a folder of logs" in told
     code, _, told = groundstation("study", "heading", "--input", str(tmp_path), "-o", str(tmp_path / "other"))
     assert code == 2 and "--input with heading, which reads no files, expected read" in told
+
+
+def test_version_told_names_the_commit_of_a_checkout_alone(tmp_path: Path) -> None:
+    assert commit_of(tmp_path) == "" and version_told(tmp_path) == f"groundstation {__version__}"
+    (tmp_path / ".git").mkdir()  # nothing in it: git refuses
+    assert commit_of(tmp_path) == ""
 
 
 @pytest.mark.slow

@@ -78,11 +78,16 @@ class StudyResult:
     @property
     def markdown(self) -> str:
         """The page as a Markdown document."""
-        parts = (
+        return self.markdown_with("")
+
+    def markdown_with(self, line: str) -> str:
+        """Return the page as a Markdown document with a line, Markdown already, below its title."""
+        parts = [
             markdown(section, level=2 if number else 1, widest=sys.maxsize)
             for number, section in enumerate(self.sections)
-        )
-        return "\n\n".join(parts) + "\n"
+        ]
+        title, _, rest = parts[0].partition("\n\n")
+        return "\n\n".join(part for part in (title, line, rest, *parts[1:]) if part) + "\n"
 
 
 def section(title: str, *parts: Part | str) -> Section:

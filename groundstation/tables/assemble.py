@@ -1,20 +1,28 @@
 """Tables from record batches and back, the same whether a log or the store was read."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.geodesy import MOST_ON_EARTH_DEG
-from groundstation.base.records import MAX_BATCH_ROWS, BoolArray, Column, Int64Array, RecordBatch
+from groundstation.base.records import MAX_BATCH_ROWS, Column, RecordBatch
 from groundstation.base.signals import has_values, is_canonical
+from groundstation.tables.growing import GrowingTable, time_of_validity_ns, unless_all
 from groundstation.tables.table import Flight, Table
+
+NOT_TOLD: Mapping[str, int] = MappingProxyType({})
 
 
 def flight_from_batches(
-    batches: Iterable[RecordBatch], *, metadata: Mapping[str, str], has_utc: bool, source_name: str
+    batches: Iterable[RecordBatch],
+    *,
+    metadata: Mapping[str, str],
+    has_utc: bool,
+    source_name: str,
+    rows: Mapping[str, int] = NOT_TOLD,
 ) -> Flight:
     """Gather batches into one table per topic, in order of time of validity.
 
@@ -26,6 +34,8 @@ def flight_from_batches(
         leave no table, and words and bytes as recorded (:func:`groundstation.base.signals.has_values`) none either.
     metadata, has_utc, source_name
         As in :class:`Flight`.
+    rows : mapping of topic to int
+        Rows to be expected, as a ledger counts them: each column is then made once. More or fewer do no harm.
 
     Returns
     -------
@@ -49,18 +59,29 @@ def flight_from_batches(
     >>> flight["ins"].values("roll_deg").tolist(), flight.start_ns
     ([1.0, 2.0, nan], 10)
     """
-    by_topic: dict[str, list[RecordBatch]] = {}
+    first: dict[str, RecordBatch] = {}
+    growing: dict[str, GrowingTable] = {}
     starts_ns: list[int] = []
     for batch in batches:
         if batch.time_ns is None:
             raise GroundstationError(
                 f"{source_name}, {batch.topic}", "records without corrected time", "time_ns", "fit the clock first"
             )
-        if len(batch) and has_values(batch.topic):
-            by_topic.setdefault(batch.topic, []).append(batch)
-        elif len(batch):
+        if not len(batch):
+            continue
+        if not has_values(batch.topic):
             starts_ns.append(int(batch.time_ns.min()))
-    tables = {topic: _table(topic, parts) for topic, parts in by_topic.items()}
+        elif batch.topic not in first:
+            first[batch.topic] = batch  # most topics have one alone: its arrays are the table's
+        else:
+            if batch.topic not in growing:
+                growing[batch.topic] = GrowingTable(batch.topic, rows.get(batch.topic, 0))
+                growing[batch.topic].add(first[batch.topic])
+            growing[batch.topic].add(batch)
+    tables = {}
+    for topic in list(first):
+        alone, several = first.pop(topic), growing.pop(topic, None)
+        tables[topic] = _in_order(_of_one(alone) if several is None else several.table())
     start_ns = min((*(int(table.time_ns[0]) for table in tables.values()), *starts_ns), default=0)
     return Flight(tables, metadata, start_ns, has_utc, source_name)
 
@@ -83,49 +104,23 @@ def batches_from_flight(flight: Flight, max_rows: int = MAX_BATCH_ROWS) -> Itera
         )
 
 
-def _table(topic: str, parts: list[RecordBatch]) -> Table:
-    lengths = [len(part) for part in parts]
-    names = dict.fromkeys(name for part in parts for name in part.columns)  # in order of first appearance
-    columns = {name: _column([part.columns.get(name) for part in parts], lengths) for name in names}
-    table = Table(
-        topic,
-        np.concatenate([_time_of_validity_ns(part) for part in parts]),
-        _with_places_on_earth(columns) if is_canonical(topic) else columns,
-        np.concatenate([part.record_index for part in parts]),
-        _column([part.device_time_ns for part in parts], lengths),
-    )
+def _of_one(batch: RecordBatch) -> Table:
+    """Return the table of a single batch, whose arrays it has."""
+    columns = {name: Column(one.values, unless_all(one.present)) for name, one in batch.columns.items()}
+    device = Column(batch.device_time_ns.values, unless_all(batch.device_time_ns.present))
+    return Table(batch.topic, time_of_validity_ns(batch), columns, batch.record_index, device)
+
+
+def _in_order(table: Table) -> Table:
+    """Return a table in order of time, without places that are not on Earth."""
+    if is_canonical(table.topic):
+        table = replace(table, columns=_with_places_on_earth(table.columns))
     if np.all(table.time_ns[1:] >= table.time_ns[:-1]):
         return table
     return table.take(np.argsort(table.time_ns, kind="stable"))
 
 
-def _time_of_validity_ns(part: RecordBatch) -> Int64Array:
-    assert part.time_ns is not None  # checked where the batches come in
-    return part.time_ns if part.validity_time_ns is None else part.validity_time_ns
-
-
-def _column(pieces: list[Column | None], lengths: list[int]) -> Column:
-    """Join the pieces of one field; None stands for a batch without it."""
-    known = [piece for piece in pieces if piece is not None]
-    if len(pieces) == 1:
-        return Column(known[0].values, _unless_all(known[0].present))
-    dtype = _common_type([piece.values.dtype for piece in known])
-    values: NDArray[Any] = np.empty(sum(lengths), dtype=dtype)
-    is_partial = len(known) < len(pieces) or any(piece.present is not None for piece in known)
-    present = np.ones(len(values), dtype=bool) if is_partial else None
-    end = 0
-    for piece, length in zip(pieces, lengths, strict=True):
-        start, end = end, end + length
-        if piece is not None:
-            values[start:end] = piece.values
-        else:
-            values[start:end] = np.nan if dtype.kind == "f" else np.zeros(1, dtype=dtype)
-        if present is not None:
-            present[start:end] = False if piece is None else piece.mask
-    return Column(values, _unless_all(present))
-
-
-def _with_places_on_earth(columns: dict[str, Column]) -> dict[str, Column]:
+def _with_places_on_earth(columns: Mapping[str, Column]) -> Mapping[str, Column]:
     """Columns whose latitude and longitude are absent where one of them is not on Earth."""
     named = {name: columns[name] for name in MOST_ON_EARTH_DEG if name in columns}
     places = {name: column for name, column in named.items() if column.values.dtype.kind in "fiu"}
@@ -133,13 +128,4 @@ def _with_places_on_earth(columns: dict[str, Column]) -> dict[str, Column]:
     off = np.any(beyond, axis=0) if beyond else np.zeros(0, dtype=bool)
     if not off.any():
         return columns
-    return columns | {name: Column(column.values, column.mask & ~off) for name, column in places.items()}
-
-
-def _common_type(dtypes: list[np.dtype[Any]]) -> np.dtype[Any]:
-    first = dtypes[0]
-    return first if all(dtype == first for dtype in dtypes) else np.result_type(*dtypes)
-
-
-def _unless_all(present: BoolArray | None) -> BoolArray | None:
-    return None if present is None or present.all() else present
+    return {**columns, **{name: Column(column.values, column.mask & ~off) for name, column in places.items()}}

@@ -3,6 +3,8 @@
 No value is ever altered.
 """
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,7 @@ FloatArray = NDArray[np.float64]
 
 GAP_STEPS = 3.0  # a step longer than this many ordinary ones is a gap; ordinary: the 90th percentile, so that
 ORDINARY_QUANTILE = 0.9  # irregular sampling (events, values sent on change) is not cut to pieces
+ROWS_AT_ONCE = 1 << 18
 FEW_ROWS = 10  # too few to say what an ordinary step is
 
 
@@ -23,11 +26,19 @@ def gap_after(time_ns: Int64Array) -> BoolArray:
     >>> gap_after(np.array([*range(20), 40, 41])).nonzero()[0].tolist()
     [19]
     """
-    steps = np.diff(time_ns)
-    if len(steps) < FEW_ROWS:
-        return np.zeros(len(steps), dtype=bool)
-    ordinary = float(np.quantile(steps, ORDINARY_QUANTILE))
-    return steps > GAP_STEPS * max(ordinary, 1.0)
+    count = max(len(time_ns) - 1, 0)
+    breaks = np.zeros(count, dtype=bool)
+    if count < FEW_ROWS:
+        return breaks
+    ordinary = float(np.quantile(np.diff(time_ns), ORDINARY_QUANTILE, overwrite_input=True))
+    for part in _parts(count):
+        breaks[part] = np.diff(time_ns[part.start : part.stop + 1]) > GAP_STEPS * max(ordinary, 1.0)
+    return breaks
+
+
+def _parts(rows: int) -> Iterator[slice]:
+    """Yield the rows in parts: working arrays do not grow with a log."""
+    return (slice(start, min(start + ROWS_AT_ONCE, rows)) for start in range(0, rows, ROWS_AT_ONCE))
 
 
 def covers_gap(time_ns: Int64Array, gap_starts_ns: Int64Array) -> BoolArray:
@@ -76,13 +87,26 @@ def break_line(time_ns: Int64Array, values: FloatArray, breaks: BoolArray) -> tu
 
 
 def thin(values: FloatArray, breaks: BoolArray, limit: int) -> Int64Array:
-    """Choose rows that keep the picture of a line.
+    """Choose rows that keep the picture of a line, as :func:`thin_series`; shape (n, k).
+
+    Examples
+    --------
+    >>> spike = np.zeros((1000, 1)); spike[617] = 9.0
+    >>> kept = thin(spike, np.zeros(999, dtype=bool), 100)
+    >>> len(kept) <= 100, 617 in kept
+    (True, True)
+    """
+    return thin_series(list(values.T), breaks, limit)
+
+
+def thin_series(series: Sequence[FloatArray], breaks: BoolArray, limit: int) -> Int64Array:
+    """Choose rows that keep the picture of lines that share their rows.
 
     The extremes of every series in every stretch, and both sides of each break.
 
     Parameters
     ----------
-    values : ndarray, shape (n, k)
+    series : sequence of ndarray, each of shape (n,)
     breaks : ndarray of bool, shape (n - 1,)
         A line breaks between row i and row i + 1.
     limit : int
@@ -92,34 +116,37 @@ def thin(values: FloatArray, breaks: BoolArray, limit: int) -> Int64Array:
     -------
     ndarray of int64
         Positions of the rows kept, increasing; all of them when n <= limit.
-
-    Examples
-    --------
-    >>> spike = np.zeros((1000, 1)); spike[617] = 9.0
-    >>> kept = thin(spike, np.zeros(999, dtype=bool), 100)
-    >>> len(kept) <= 100, 617 in kept
-    (True, True)
     """
-    rows, series = values.shape
+    rows = len(series[0])
     if rows <= limit:
         return np.arange(rows, dtype=np.int64)
-    stretches = max(limit // (2 * series), 1)
+    stretches = max(limit // (2 * len(series)), 1)
     length = -(-rows // stretches)
-    padded = np.full((stretches * length, series), np.nan)
-    padded[:rows] = values
-    blocks = padded.reshape(stretches, length, series)
-    starts = np.arange(stretches)[:, None] * length
-    lowest = np.argmin(np.where(np.isnan(blocks), np.inf, blocks), axis=1) + starts
-    highest = np.argmax(np.where(np.isnan(blocks), -np.inf, blocks), axis=1) + starts
     keep = np.zeros(stretches * length, dtype=bool)
-    keep[lowest], keep[highest] = True, True
+    edges = breaks.copy()
+    for values in series:
+        _keep_extremes(values, length, keep)
+        unknown = np.isnan(values)
+        edges |= unknown[1:] != unknown[:-1]
     keep = keep[:rows]
-    unknown = np.isnan(values)
-    edges = breaks | (unknown[1:] != unknown[:-1]).any(axis=1)
     keep[:-1] |= edges
     keep[1:] |= edges
     keep[[0, -1]] = True
     return np.flatnonzero(keep)
+
+
+def _keep_extremes(values: FloatArray, length: int, keep: BoolArray) -> None:
+    """Mark the lowest and the highest row of every stretch, some stretches at a time."""
+    at_once = max(ROWS_AT_ONCE // length, 1)
+    for first in range(0, -(-len(values) // length), at_once):
+        part = values[first * length : (first + at_once) * length]
+        padded = np.full((-(-len(part) // length), length), np.nan)
+        padded.ravel()[: len(part)] = part
+        unknown = np.isnan(padded)
+        starts = (first + np.arange(len(padded))) * length
+        for filler, find in ((np.inf, np.argmin), (-np.inf, np.argmax)):
+            padded[unknown] = filler
+            keep[find(padded, axis=1) + starts] = True
 
 
 def rows_that_fit(rows: list[int], widths: list[int], scalars: int) -> int:

@@ -37,6 +37,28 @@ def test_fields_that_come_and_go_are_absent_where_missing() -> None:
     assert (flight.start_ns, flight.topics(), flight.metadata["aircraft"]) == (5, ("gnss", "ins"), "A")
 
 
+@pytest.mark.parametrize("expected", [0, 1, 7, 50])
+def test_rows_that_were_expected_change_nothing(expected: int) -> None:
+    types = ["i2", "u2", "f4", "i2", "f8", "u2", "i2"]
+    parts = [batch("ins", [t], t, count=np.array([t], dtype=kind)) for t, kind in enumerate(types)]
+    parts[3] = batch("ins", [3], 3, mode=["attitude"])
+    flight = flight_from_batches(parts, metadata={}, has_utc=True, source_name="a.csv", rows={"ins": expected})
+    count, mode = (flight["ins"].columns[name] for name in ("count", "mode"))
+    assert count.values.dtype == np.float64 and count.values[count.mask].tolist() == [0, 1, 2, 4, 5, 6]
+    assert mode.values.dtype == "U8" and flight["ins"].text("mode").tolist() == [*[""] * 3, "attitude", *[""] * 3]
+    assert flight["ins"].time_ns.tolist() == flight["ins"].record_index.tolist() == [*range(7)]
+
+
+def test_a_table_of_many_batches_holds_each_value_once() -> None:
+    parts = [batch("ins", [t, t], t, roll_deg=[1.0, 2.0]) for t in range(2_000)]
+    for rows, most in (({}, 1.15), ({"ins": 4_000}, 1.0)):
+        flight = flight_from_batches(parts, metadata={}, has_utc=True, source_name="a.csv", rows=rows)
+        held = flight["ins"].columns["roll_deg"].values
+        while held.base is not None:
+            held = held.base
+        assert held.nbytes <= most * 4_000 * 8
+
+
 def test_a_place_that_is_not_on_earth_is_absent_and_raw_topics_keep_it() -> None:
     places = {
         "latitude_deg": [56.0, 95.0, -91.0, 56.0, np.nan, np.inf, -90.0],

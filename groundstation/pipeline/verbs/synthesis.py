@@ -4,6 +4,7 @@ The runs of a study are kept in its folder, so that a stopped study continues.
 """
 
 import json
+import shlex
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
@@ -26,6 +27,7 @@ R = TypeVar("R")
 
 Form = Literal["csv", "ch10", "ulog", "dataflash", "ros1"]
 Kind = Literal["imu", "fleet", "session", "approach", "units", "flight"]  # of a scenario
+EVIDENCE = "evidence.md"
 SUFFIXES: Mapping[Form, str] = MappingProxyType({"csv": "csv", "ulog": "ulg", "dataflash": "BIN", "ros1": "bag"})
 
 
@@ -196,8 +198,9 @@ def study_to(
     inputs: Path | None = None,
     minutes: float | None = None,
 ) -> str:
-    """Run a study into a folder: ``<name>.md`` and tables/*.csv; returns the page's text.
+    """Run a study into a folder: its page, tables and evidence.md; return the page's text.
 
+    The page is ``<name>.md``, the tables tables/*.csv; evidence.md is the page with its provenance, for docs/evidence/.
     ``inputs`` are the files of a study that reads some. Where a study keeps its runs, they are in ``runs/``: the same
     command goes on with them, ``minutes`` ends it before all are made; ``force`` makes them afresh.
 
@@ -228,9 +231,20 @@ def study_to(
     for table in result.tables:
         write_text(folder / "tables" / f"{table.name}.csv", csv_text(table))
     write_text(page, result.markdown)
+    given = {"--runs": runs, "--seed": seed, "--input": inputs, "--minutes": minutes}
+    write_text(folder / EVIDENCE, result.markdown_with(_provenance(name, given)))
     (folder / STUDY_MARK).touch()
     listen(Event("end", name, str(page)))
     return result.markdown
+
+
+def _provenance(name: str, given: Mapping[str, object]) -> str:
+    """Return one line: the command of a study and its options, version, date, machine."""
+    from groundstation.pipeline.verbs.provenance import this_machine, utc_told, version_told
+
+    options = [str(word) for option, value in given.items() if value is not None for word in (option, value)]
+    command = shlex.join(["groundstation", "study", name, *options, "-o", "DIR"]).replace("`", "'")
+    return f"Made by `{command}`; {version_told()}; {utc_told()}; {this_machine()}."
 
 
 def _with_inputs(study: "Study", inputs: Path | None) -> "Callable[..., StudyResult]":

@@ -5,7 +5,7 @@ most rows at one instant) are tables.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,7 +31,7 @@ from groundstation.viewer.names import (
     words,
 )
 from groundstation.viewer.recorder import Line, Recorder
-from groundstation.viewer.series import FloatArray, covers_gap, gap_after, rows_that_fit, runs, thin, wraps_after
+from groundstation.viewer.series import FloatArray, covers_gap, gap_after, rows_that_fit, runs, thin_series, wraps_after
 from groundstation.viewer.views import document, lanes, plot
 
 SCALARS = 1_200_000  # numbers in this tab: about 25 MB, an hour at 100 Hz
@@ -54,19 +54,34 @@ _AXES = re.compile(r"(_(north|east|down|x|y|z|w|forward|right|roll|pitch|xx|xy|x
 class FieldFamily:
     """Fields of one topic that belong on one axis and share their rows.
 
-    ``breaks`` tells after which rows the lines end, shape (n - 1,). ``name`` is the field's own, without unit, where
+    ``rows`` are those that have them, shape (n,), None for all. ``breaks`` tells after which of them the lines end,
+    shape (n - 1,). ``name`` is the field's own, without unit, where
     the family has one field alone. ``unit`` is the source's for topics that are not ours.
     """
 
     topic: str
     name: str
     fields: tuple[str, ...]
-    time_ns: Int64Array
-    values: FloatArray
+    table: Table
+    rows: BoolArray | None
     breaks: BoolArray
     is_circular: bool
     is_stepped: bool = False
     unit: str = ""
+
+    def __len__(self) -> int:
+        return len(self.breaks) + 1
+
+    @property
+    def time_ns(self) -> Int64Array:
+        """Times of its rows."""
+        return self.table.time_ns if self.rows is None else self.table.time_ns[self.rows]
+
+    def series(self) -> Iterator[FloatArray]:
+        """Yield the values of each field at its rows, float64, shape (n,)."""
+        for field in self.fields:
+            values = np.asarray(self.table.columns[field].values, float)
+            yield values if self.rows is None else values[self.rows]
 
     @property
     def title(self) -> str:
@@ -97,7 +112,7 @@ def raw(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Conta
         units = source_units(flight.metadata, topic, flight[topic].columns)
         families[topic] = _families(flight[topic], recorder.time_ns(starts), units)
     everyone = [family for own in families.values() for family in own]
-    limit = rows_that_fit([len(one.time_ns) for one in everyone], [len(one.fields) for one in everyone], SCALARS)
+    limit = rows_that_fit([len(one) for one in everyone], [len(one.fields) for one in everyone], SCALARS)
     kept: dict[str, int] = {}
     left_out: list[str] = []
     canonical: list[rrb.Container] = []
@@ -232,10 +247,9 @@ def _families(table_of_topic: Table, gap_starts_ns: Int64Array, units: Mapping[s
     found = []
     breaks_of: dict[bytes, BoolArray] = {}
     for (name, _unit, is_stepped, presence), fields in groups.items():
-        mask = table_of_topic.columns[fields[0]].mask
-        time_ns = table_of_topic.time_ns[mask]
-        values = np.column_stack([np.asarray(table_of_topic.columns[field].values, float)[mask] for field in fields])
+        rows = table_of_topic.columns[fields[0]].present
         if presence not in breaks_of:
+            time_ns = table_of_topic.time_ns if rows is None else table_of_topic.time_ns[rows]
             breaks = gap_after(time_ns) | covers_gap(time_ns, gap_starts_ns)
             breaks_of[presence] = (
                 breaks & (not _isolates(breaks)) if table_of_topic.topic.startswith(RAW_PREFIX) else breaks
@@ -243,7 +257,7 @@ def _families(table_of_topic: Table, gap_starts_ns: Int64Array, units: Mapping[s
         title = name if len(fields) > 1 else split_unit(fields[0])[0]
         breaks = breaks_of[presence]
         unit = units.get(fields[0], "")
-        of_topic = table_of_topic.topic, title, tuple(fields), time_ns, values
+        of_topic = table_of_topic.topic, title, tuple(fields), table_of_topic, rows
         found.append(FieldFamily(*of_topic, breaks, name in CIRCULAR, is_stepped, unit))
     return found
 
@@ -280,8 +294,9 @@ def _log_families(
             Line(name_of(field), colour)
             for field, colour in zip(family.fields, colours.for_series(len(family.fields)), strict=True)
         ]
-        rows = thin(family.values, family.breaks, limit)
-        time_ns, values = family.time_ns[rows], family.values[rows]
+        series = list(family.series())
+        rows = thin_series(series, family.breaks, limit)
+        time_ns, values = family.time_ns[rows], np.column_stack([one[rows] for one in series])
         breaks = family.breaks[rows[:-1]]
         if family.is_circular:
             breaks = breaks | wraps_after(values)
@@ -335,7 +350,7 @@ def _about(
 ) -> str:
     rows = []
     for topic, own in families.items():
-        total = max((len(family.time_ns) for family in own), default=len(flight[topic]))
+        total = max((len(family) for family in own), default=len(flight[topic]))
         shown = "every row" if kept[topic] >= total or not own else f"{kept[topic]} of {total} rows"
         rows.append([markdown_text(topic), str(len(flight[topic])), str(sum(len(one.fields) for one in own)), shown])
     parts = [
