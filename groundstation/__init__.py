@@ -3,19 +3,31 @@
 The Python API, see docs/api.md: ``flight = groundstation.open("log.ulg")``.
 """
 
-__all__ = ["GroundstationError", "OpenFlight", "__version__", "open", "open_fleet", "simulate"]
+__all__ = [
+    "Fleet",
+    "GroundstationError",
+    "NotAssessableError",
+    "OpenFlight",
+    "__version__",
+    "open",
+    "open_fleet",
+    "simulate",
+]
 
 TYPE_CHECKING = False  # type checkers take it for true; nothing is imported at run time
 if TYPE_CHECKING:
-    from groundstation.base.errors import GroundstationError
+    from groundstation.base.errors import GroundstationError, NotAssessableError
     from groundstation.base.version import __version__
     from groundstation.pipeline.api import open_fleet, simulate
     from groundstation.pipeline.api import open_flight as open
+    from groundstation.pipeline.fleet_frame import Fleet
     from groundstation.pipeline.notebook import OpenFlight
 
 _HOMES = {
     "__version__": ("groundstation.base.version", "__version__"),
+    "Fleet": ("groundstation.pipeline.fleet_frame", "Fleet"),
     "GroundstationError": ("groundstation.base.errors", "GroundstationError"),
+    "NotAssessableError": ("groundstation.base.errors", "NotAssessableError"),
     "OpenFlight": ("groundstation.pipeline.notebook", "OpenFlight"),
     "open": ("groundstation.pipeline.api", "open_flight"),
     "open_fleet": ("groundstation.pipeline.api", "open_fleet"),

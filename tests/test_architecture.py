@@ -51,7 +51,7 @@ OF_PAGES = ("answer", "arrays", "chapter", "plots", "page")  # of a system; they
 PARTS_OF_THE_PIPELINE = ("one_flight", "many_flights", "verbs", "")  # each imports those before it; "": the Python API
 FLOORS_OF_MANY_FLIGHTS = 5
 ALLOWED_TO_NAME = {
-    "pipeline/notebook.py": "the Python API has a method for each answer",
+    "pipeline/answer_methods.py": "the Python API has a method for each answer",
     "pipeline/verbs/acceptance.py": "the verb holds an INS against a standard, by its errors and its heading",
 }
 # Strings equal to the name of an analysis or of a plan: the word, files or folders (ending in /), what it means there.

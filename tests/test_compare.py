@@ -18,6 +18,7 @@ from groundstation.base.errors import UnreadableLogError, UsageError
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.chapters.comparison import conclusion, plain_name
 from groundstation.chapters.plots.comparison import sides_of
+from groundstation.cli.flights import comparison_text
 from groundstation.cli.main import app
 from groundstation.pipeline.many_flights.inputs import collect
 from groundstation.pipeline.one_flight.configuration import Configuration
@@ -266,6 +267,12 @@ def test_an_outage_is_the_first_interval_without_gnss() -> None:
     assert align(other, saved_with(figures), "outage", is_same_log=False).offset_s == -5.0
 
 
+def test_a_reference_that_judges_nothing_is_not_compared() -> None:
+    for is_judge in (True, False):
+        summary = {"results": {"reference": {"is_judge": is_judge, "offset_s": 1.0}}}
+        assert any(one.name.startswith("reference.") for one in deltas_of(summary, summary)) == is_judge
+
+
 def test_two_flights_are_not_compared_by_their_stands_and_come_to_a_conclusion(folders: dict[str, Path]) -> None:
     one, two = compared(folders["good"], folders["faster"]), compared(folders["good"], folders["later"])
     assert "heading.parking_heading_deg" in by_name(one)
@@ -297,6 +304,8 @@ def test_names_are_plain_and_landing_and_health_are_compared(tmp_path: Path) -> 
     assert "Approaches: approaches found" in titles
     text = "Autopilot health: worst of the checks: pass in A, fail in B."
     assert conclusion(comparison).text.endswith(text) and conclusion(comparison).tone == "warn"
+    shown = comparison_text(comparison)
+    assert "\nHeading: error, °" in shown and "heading.error_deg" not in shown, "the terminal has the page's names"
     assert "heading.error_deg" not in re.sub("<svg.*?</svg>", "", comparison_html(comparison, a, b), flags=re.DOTALL)
 
 

@@ -9,6 +9,12 @@ ROOT = Path(__file__).parent.parent
 PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")])
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 README_WORDS = 500  # more is not read
+PAGE_WORDS, ALL_WORDS = 1200, 37_000  # of a page of a system; of all pages but those apart
+APART = ("evidence/", "decisions/", "health_checks.md")  # the last is made from thresholds.toml
+SYSTEMS = (
+    *("heading", "installation", "inertial", "several_ins", "trajectory", "magnetic", "flux_valve", "approaches"),
+    *("landing", "cooperative", "cooperative_stations", "control", "health", "gnss", "latency", "reference"),
+)
 
 
 def slugs(text: str) -> set[str]:
@@ -30,8 +36,23 @@ def test_links_lead_somewhere(page: Path) -> None:
     assert not broken, broken
 
 
+def words(page: Path) -> int:
+    """The words of a page, tables and code with them."""
+    return len(page.read_text(encoding="utf-8").split())
+
+
 def test_readme_is_one_screen() -> None:
-    assert len((ROOT / "README.md").read_text(encoding="utf-8").split()) <= README_WORDS
+    assert words(ROOT / "README.md") <= README_WORDS
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_a_page_of_a_system_is_read_in_ten_minutes(name: str) -> None:
+    assert words(ROOT / "docs" / f"{name}.md") <= PAGE_WORDS, "figures belong to docs/evidence"
+
+
+def test_pages_stay_few() -> None:
+    read = {page.relative_to(ROOT / "docs").as_posix(): words(page) for page in (ROOT / "docs").rglob("*.md")}
+    assert sum(count for name, count in read.items() if not name.startswith(APART)) <= ALL_WORDS
 
 
 def test_every_page_is_listed() -> None:

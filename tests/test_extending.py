@@ -24,6 +24,7 @@ RECIPES = dict(
     re.findall(r"^## ((?:A system|A tab|A signal|A reader))\n(.*?)(?=^## |\Z)", PAGE, re.MULTILINE | re.DOTALL)
 )
 FILE_BLOCKS = re.compile(r"^`([\w/]+\.(?:py|proto))`\n\n```(python|diff|proto)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+FILE_LINK = re.compile(r"^\[`([\w/]+\.py)`\]\((examples/[\w/.]+)\)$", re.MULTILINE)
 TOML_BLOCK = re.compile(r"^```toml\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LONGEST_S = 300
 
@@ -64,6 +65,8 @@ def groundstation(folder: Path, *arguments: str) -> subprocess.CompletedProcess[
 def carry_out(recipe: str, folder: Path) -> None:
     """Write the files of a recipe into a copy of the package, and change those that it changes."""
     blocks = FILE_BLOCKS.findall(RECIPES[recipe])
+    for name, link in FILE_LINK.findall(RECIPES[recipe]):
+        blocks.append((name, "python", (ROOT / "docs" / link).read_text(encoding="utf-8")))
     assert blocks, recipe
     for name, kind, text in blocks:
         path = folder / name

@@ -297,7 +297,7 @@ def test_a_tab_of_a_flight_that_fails_leaves_the_others(
 ) -> None:
     shown: list[str] = []
     layout = recording.send_layout
-    monkeypatch.setattr(recording, "send_layout", lambda stream, tabs: shown.extend(one.name for one in tabs))
+    monkeypatch.setattr(recording, "send_layout", lambda stream, tabs, **_: shown.extend(one.name for one in tabs))
     named = recording.tabs_of
 
     def tabs(*given: Any) -> Iterator[Any]:

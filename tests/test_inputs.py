@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from groundstation.base.errors import UsageError
-from groundstation.pipeline.many_flights.inputs import collect
+from groundstation.pipeline.many_flights.inputs import collect, no_log
 
 
 def touched(path: Path) -> Path:
@@ -68,3 +68,12 @@ def test_folders_of_any_depth_are_walked(tmp_path: Path) -> None:
 def test_a_missing_path_is_a_usage_error(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no such file"):
         collect([tmp_path / "none"])
+
+
+def test_a_folder_in_place_of_a_log_names_the_next_step(tmp_path: Path) -> None:
+    touched(tmp_path / "out/flight/manifest.json")
+    assert str(no_log(tmp_path)).endswith("found a folder, expected a log: `run` takes folders")
+    assert str(no_log(tmp_path / "out")).endswith("of flights, expected a log: name the .mcap of a flight in it")
+    assert str(no_log(tmp_path / "out/flight")).endswith("of a flight, expected a log: name the .mcap in it")
+    told = str(no_log(tmp_path / "out", takes_flights=True))
+    assert told.endswith("expected a log or the folder of one flight: name a flight in it")

@@ -18,14 +18,19 @@ from groundstation.pipeline.many_flights.inputs import flight_folders, session_f
 from groundstation.pipeline.one_flight.analyse import run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.pipeline.verbs.cooperative import run_session
+from groundstation.plots.extents import x_extent, y_extent, y_span
+from groundstation.plots.marks import Outlines
+from groundstation.results.figures import FigureData
 from groundstation.results.files import load_manifest
 from groundstation.results.flight import FlightResults
 from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_log import write_session
 from groundstation.systems.cooperative.analysis import COOPERATIVE, NIS_MAX, innovations_of
 from groundstation.systems.cooperative.answer import CooperativeResult
-from groundstation.systems.cooperative.chapter import TITLES, cooperative, session_front, trusted, worst_first
+from groundstation.systems.cooperative.arrays import CooperativeTracks
+from groundstation.systems.cooperative.chapter import TITLES, cooperative, in_text, session_front, trusted, worst_first
 from groundstation.systems.cooperative.estimate import estimate_session
+from groundstation.systems.cooperative.plots import errors, session_map
 from groundstation.systems.cooperative.settings import ALGORITHMS, CooperativeSettings, InsBelief
 from groundstation.systems.known import SessionKnown
 from tests.recording_contents import Contents
@@ -320,7 +325,7 @@ def test_the_chapter_tells_algorithms_aircraft_geometry_links_and_clocks(
     assert names == list(TITLES.values())
     (chosen,) = [row[0].text for row in found["Algorithms"].rows if isinstance(row[0], Mark) and row[0].tone == "good"]
     assert chosen == TITLES[best.algorithm]
-    assert [row[0] for row in found[f"Aircraft, {TITLES[best.algorithm]}"].rows] == ["A", "B", "C"]
+    assert [row[0] for row in found[f"Aircraft, {in_text(best.algorithm)}"].rows] == ["A", "B", "C"]
     assert [row[0] for row in found["Geometry"].rows] == ["A", "B", "C"]
     assert len(found["Links"].rows) == len(answer.links)
     residuals = [row.residual_rms_m for row in worst_first(answer.links)]
@@ -338,12 +343,53 @@ def test_without_truth_nothing_is_judged(results: FlightResults, answer: Coopera
     rows = tuple(replace(row, **nothing) for row in answer.algorithms)  # type: ignore[arg-type]
     blind = replace(results, answers={"cooperative": replace(answer, algorithms=rows)})
     section = section_of(blind)
-    (note,) = [part for part in section.parts if isinstance(part, Note)]
+    (note,) = [part for part in section.above if isinstance(part, Note)]
     assert note.tone == "unknown"
     assert "no log holds a truth" in note.text
     cells = [cell.text for row in grids(section)["Algorithms"].rows for cell in row[1:] if isinstance(cell, Mark)]
     assert set(cells) == {"no truth"}
     assert front(blind).verdict == Mark("unknown", "Not judged")
+
+
+def with_tracks(results: FlightResults, **columns: np.ndarray) -> FlightResults:
+    """The results with some columns of the tracks in place of their own."""
+    return replace(
+        results,
+        figures=tuple(
+            FigureData(one.name, {**one.columns, **(columns if one.name == "cooperative_tracks" else {})}, one.digits)
+            for one in results.figures
+        ),
+    )
+
+
+def test_ellipses_never_squeeze_the_map(results: FlightResults) -> None:
+    def mapped(of: FlightResults) -> tuple[str, list[float], int]:
+        drawn = session_map(of)
+        assert drawn is not None
+        marks = drawn.rows[0].panels[0].marks
+        rings = sum(len(mark.rings) for mark in marks if isinstance(mark, Outlines))
+        return drawn.caption, [*x_extent(marks), *y_extent(marks)], rings
+
+    data = results.rows_of(CooperativeTracks)
+    assert data is not None
+    caption, ends, rings = mapped(results)
+    assert rings == 24 and "wider" not in caption
+    late = data.time_s > 0.5 * data.time_s.max()
+    wide = with_tracks(results, sigma_north_m=np.where(late, 1e7, data.sigma_north_m))
+    caption, with_wide, rings = mapped(wide)
+    assert with_wide == ends and rings == 12 and "; 12 wider than the map are not drawn" in caption
+
+
+def test_errors_that_span_two_decades_have_a_logarithmic_axis(results: FlightResults) -> None:
+    data = results.rows_of(CooperativeTracks)
+    assert data is not None
+    for largest, scale in ((30.0, "linear"), (3000.0, "log")):
+        bound = np.where(data.algorithm == "dead_reckoning", largest, np.linspace(20.0, 29.0, len(data.time_s)))
+        drawn = errors(with_tracks(results, two_sigma_r_m=bound, error_m=np.full(len(bound), 12.0)))
+        assert drawn is not None
+        for panel in (panel for row in drawn.rows for panel in row.panels):
+            span = y_span(panel)
+            assert span.scale == scale and span.low <= 12.0 and span.high >= largest, "all three curves are seen"
 
 
 def test_a_session_without_an_answer_says_why(results: FlightResults) -> None:

@@ -7,3 +7,4 @@ html_title = "groundstation"
 html_copy_source = False
 myst_heading_anchors = 4
 suppress_warnings = ["misc.highlighting_failure"]
+highlight_language = "none"

@@ -1,6 +1,8 @@
-"""Pages of the site that the code itself writes: verbs, settings, findings, formats, analyses."""
+"""Pages of the site that the code itself writes: verbs, settings, findings, formats, signals, summary.json."""
 
 import ast
+import json
+import math
 import re
 from collections.abc import Iterator, Mapping
 from itertools import groupby
@@ -11,11 +13,14 @@ import typer.main
 
 import groundstation
 from groundstation.base.findings import Severity
+from groundstation.base.signals import TOPICS, Field
+from groundstation.base.unit_names import UNITS
 from groundstation.cli.main import app
 from groundstation.pipeline.verbs.catalogue import catalogue
 from groundstation.pipeline.verbs.settings_list import every_setting
 
 PACKAGE = Path(groundstation.__file__).parent
+SCHEMA = PACKAGE.parent / "schemas" / "summary.schema.json"
 CODE = re.compile(r"[a-z_]+\.[a-z_]+[a-z]")
 
 
@@ -24,11 +29,13 @@ def pages() -> Mapping[str, str]:
     return {
         "ref_verbs.md": _verbs(),
         "ref_settings.md": _settings(),
+        "ref_summary.md": _summary(json.loads(SCHEMA.read_text(encoding="utf-8"))),
         "ref_findings.md": _findings(),
-        "ref_analyses.md": _catalogue("Analyses", "analysis"),
-        "ref_formats.md": _catalogue("Formats", "format"),
+        "ref_signals.md": _signals(),
+        "ref_analyses.md": _catalogue("Every analysis", "analysis"),
+        "ref_formats.md": _catalogue("Every format", "format"),
         "ref_scenarios.md": _catalogue("Simulated flights and sessions", "scenario", "session"),
-        "ref_studies.md": _catalogue("Studies", "study"),
+        "ref_studies.md": _catalogue("Every study", "study"),
     }
 
 
@@ -153,3 +160,118 @@ def _catalogue(title: str, *kinds: str) -> str:
     if not any(row[2] for row in rows):
         return f"# {title}\n\n" + table(head[:2], [row[:2] for row in rows])
     return f"# {title}\n\n" + table(head, rows)
+
+
+# ------------------------------------------------------------------------------------------------ summary.json
+
+
+def _summary(schema: Mapping[str, Any]) -> str:
+    """Return every field of summary.json: the parts of the file, each followed by the objects in it."""
+    objects = schema["$defs"]
+    parts = [
+        "# Every field of summary.json\n",
+        f"{schema['description']} Written from schemas/summary.schema.json; a field without a meaning says it by its "
+        "name. `or null`: the value may be missing.\n",
+        _fields(schema, objects),
+    ]
+    results = schema["properties"]["results"]["properties"]
+    own = {name: one["$ref"] for name, one in schema["properties"].items() if "$ref" in one}
+    answers = {f"results.{name}": one["$ref"] for name, one in results.items()}
+    told: set[str] = {reference.rpartition("/")[2] for reference in (*own.values(), *answers.values())}
+    for path, reference in (own | answers).items():
+        name = reference.rpartition("/")[2]
+        parts.append(f"## {name}\n\nIn the file: `{path}`. {_plain(objects[name])}\n")
+        parts.append(_fields(objects[name], objects))
+        for inner in _inside(objects, name, told):
+            parts.append(f"### {inner}\n\n{_plain(objects[inner])}\n")
+            parts.append(_fields(objects[inner], objects))
+    for inner in [one for one in objects if one not in told]:
+        parts.append(f"## {inner}\n\n{_plain(objects[inner])}\n\n{_fields(objects[inner], objects)}")
+    return "\n".join(parts)
+
+
+def _inside(objects: Mapping[str, Any], name: str, told: set[str]) -> Iterator[str]:
+    """Yield the objects in an object that were not told before, each before those in it."""
+    for inner in re.findall(r'"#/\$defs/(\w+)"', json.dumps(objects[name])):
+        if inner not in told:
+            told.add(inner)
+            yield inner
+            yield from _inside(objects, inner, told)
+
+
+def _fields(described: Mapping[str, Any], objects: Mapping[str, Any]) -> str:
+    """Return the table of an object's fields; a column in which nothing stands is left out."""
+    rows = [
+        (f"`{name}`", _type(one), _unit(name), _plain(one) or _first_sentence(one, objects))
+        for name, one in described["properties"].items()
+        if name != "results" or "properties" not in one
+    ]
+    head = ("field", "type", "unit", "meaning")
+    kept = [at for at in range(len(head)) if any(row[at] for row in rows)]
+    return table(tuple(head[at] for at in kept), [tuple(row[at] for at in kept) for row in rows])
+
+
+def _first_sentence(one: Mapping[str, Any], objects: Mapping[str, Any]) -> str:
+    """Return what the object that a field holds is."""
+    name = next(iter(re.findall(r'"#/\$defs/(\w+)"', json.dumps(one))), "")
+    return _plain(objects[name]).partition(". ")[0].rstrip(".") if name else ""
+
+
+def _plain(described: Mapping[str, Any]) -> str:
+    """Return a description of the code without the marks of its docstrings."""
+    return str(described.get("description", "")).replace("``", "`")
+
+
+def _unit(name: str) -> str:
+    """Return the unit that a name ends with."""
+    return next((one.spelled for suffix, one in UNITS.items() if name.endswith(f"_{suffix}")), "")
+
+
+def _type(one: Mapping[str, Any]) -> str:
+    """Return the type of a field in words, objects as links."""
+    if "$ref" in one:
+        name = one["$ref"].rpartition("/")[2]
+        return f"[{name}](#{name})"
+    if "const" in one:
+        return str(one["const"])
+    if "enum" in one:
+        return ", ".join(str(value) for value in one["enum"])
+    if "anyOf" in one:
+        return " or ".join(_type(inner) for inner in one["anyOf"])
+    kinds = one.get("type", "any")
+    return " or ".join(_kind(kind, one) for kind in ([kinds] if isinstance(kinds, str) else kinds))
+
+
+def _kind(kind: str, one: Mapping[str, Any]) -> str:
+    if kind == "array":
+        least, most = one.get("minItems"), one.get("maxItems")
+        size = f"{least} " if least is not None and least == most else ""
+        return f"list of {size}{_type(one.get('items', {}))}"
+    inner = one.get("additionalProperties")
+    if kind == "object" and isinstance(inner, Mapping):
+        return f"object of {_type(inner)}"
+    return {"string": "text", "boolean": "true or false"}.get(kind, kind)
+
+
+# ------------------------------------------------------------------------------------------------ signals
+
+
+def _signals() -> str:
+    parts = [
+        "# Every signal\n",
+        "Topics and fields with their units and ranges; the [glossary](glossary.md) has their signs. A value out of "
+        "its range is counted by `check`. `truth` has the fields of `ins`.\n",
+    ]
+    for topic, fields in TOPICS.items():
+        if topic != "truth":
+            rows = [(f"`{one.name}`", one.kind, _unit(one.name), _range(one)) for one in fields]
+            parts.append(f"## {topic}\n\n" + table(("field", "kind", "unit", "range"), rows))
+    return "\n".join(parts)
+
+
+def _range(field: Field) -> str:
+    if field.is_heading:
+        return "[0, 360)"
+    if field.kind != "double" or (math.isinf(field.low) and math.isinf(field.high)):
+        return ""
+    return f"at least {field.low:g}" if math.isinf(field.high) else f"[{field.low:g}, {field.high:g}]"

@@ -119,3 +119,16 @@ class Clock:
     start: Start = "own_zero"
     steps: tuple[StepEntry, ...] = ()
     stray_rows: int = 0
+
+    def __repr__(self) -> str:
+        kind = "UTC" if self.is_absolute else "no UTC"
+        odd = {
+            "steps": len(self.steps),
+            "missing": self.missing_times,
+            "implausible": self.implausible_times,
+            "stale": self.stale_times,
+        }
+        told = [f"{count} {name}" for name, count in odd.items() if count]
+        beside = f", beside {', '.join(dict.fromkeys(one.clock for one in self.relations))}" if self.relations else ""
+        began = f" from {self.first_device_time}" if self.first_device_time else ""
+        return f"<Clock: {kind}{began}; {', '.join(told) or 'no odd times'}{beside}>"

@@ -1,9 +1,11 @@
 """The error ellipse of a horizontal position."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray
 
+BoolArray = NDArray[np.bool_]
 ELLIPSE_95 = float(np.sqrt(-2.0 * np.log(0.05)))  # sigmas of the ellipse that holds 95 % of a normal pair
 ROUND = np.linspace(0.0, 2.0 * np.pi, 49)
 SEEN_SHARE = 0.03  # least width of an ellipse that is seen, as a share of the map's side
@@ -55,6 +57,31 @@ def outlines(sigma_north: FloatArray, sigma_east: FloatArray, correlation: Float
     north = sigma_north[:, None] * np.cos(ROUND)
     east = sigma_east[:, None] * (correlation[:, None] * np.cos(ROUND) + across[:, None] * np.sin(ROUND))
     return sigmas * np.stack([north, east], axis=2)
+
+
+def fits(side_m: float, half_m: FloatArray) -> BoolArray:
+    """Tell of each ellipse whether a map has room for it: it is at most as wide as the map.
+
+    Examples
+    --------
+    >>> fits(100.0, np.array([50.0, 51.0, np.nan])).tolist()
+    [True, False, False]
+    """
+    return np.asarray(2.0 * half_m <= side_m)
+
+
+def told_ellipses(which: str, larger: int, left_out: int) -> str:
+    """Return the sentence of a caption on ellipses: how enlarged, how many not drawn.
+
+    Examples
+    --------
+    >>> told_ellipses("Ellipses: 95 %", 2000, 0), told_ellipses("Ellipses: 95 %", 1, 3)
+    ('Ellipses: 95 %, drawn 2000 times their size.', 'Ellipses: 95 %; 3 wider than the map are not drawn.')
+    """
+    size = f", drawn {larger} times their size" if larger > 1 else ""
+    are = "is" if left_out == 1 else "are"
+    wider = f"; {left_out} wider than the map {are} not drawn" if left_out else ""
+    return f"{which}{size}{wider}."
 
 
 def magnified(side_m: float, half_m: FloatArray) -> int:

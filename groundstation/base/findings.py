@@ -9,7 +9,7 @@ from groundstation.base.units import NS_PER_S
 
 Severity = Literal["info", "warn", "fail"]
 _AT_UTC = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?Z")
-_AT_SECONDS = re.compile(r"(?:^|\bat )\+?(\d{1,9}(?:\.\d+)?) s\b")
+_AT_SECONDS = re.compile(r"(?:^|\b(?:at|from) )\+?(\d{1,9}(?:\.\d+)?)(?: to \+?\d{1,9}(?:\.\d+)?)? s\b")
 SEVERITIES: tuple[Severity, ...] = ("info", "warn", "fail")
 
 
@@ -49,6 +49,8 @@ def place_time_ns(place: str, start_ns: int, *, has_utc: bool) -> int | None:
     --------
     >>> place_time_ns("at 12.4 s", 5, has_utc=False), place_time_ns("row 7", 5, has_utc=False)
     (12400000005, None)
+    >>> place_time_ns("78.5 to 81.1 s", 0, has_utc=False)
+    78500000000
     >>> place_time_ns("2026-05-04T06:00:01Z", 0, has_utc=True)
     1777874401000000000
     """

@@ -229,6 +229,14 @@ class Ledger:
     topics: Mapping[str, TopicEntry] = field(default_factory=dict)
     truncated: Truncation | None = None
 
+    def __repr__(self) -> str:
+        rows = sum(one.rows for one in self.topics.values())
+        gaps = sum(one.gaps.count for one in self.topics.values())
+        told = [f"{rows} rows of {len(self.topics)} topics", f"{gaps} gaps", f"{len(self.damages)} damages"]
+        if self.truncated is not None:
+            told.append(f"cut at {self.truncated.place}")
+        return f"<Ledger: {', '.join(told)}; {'data lost' if self.loses_data else 'no data lost'}>"
+
     @property
     def completeness(self) -> dict[str, float]:
         """Share of expected samples by topic, where it is known."""

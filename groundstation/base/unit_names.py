@@ -1,6 +1,6 @@
 """Table of units: suffix in names, sign in text, spelling in plain letters, decimals."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -75,3 +75,15 @@ def split_unit(name: str) -> tuple[str, UnitName | None]:
         if name.endswith("_" + suffix):
             return name[: -len(suffix) - 1], unit
     return name, None
+
+
+def units_of(names: Iterable[str]) -> dict[str, str]:
+    """Return units in plain letters by name, for the names that have one.
+
+    Examples
+    --------
+    >>> units_of(("true_heading_deg", "at.time_s", "gdop"))
+    {'true_heading_deg': 'deg', 'at.time_s': 's'}
+    """
+    found = ((str(name), split_unit(str(name))[1]) for name in names)
+    return {name: unit.spelled for name, unit in found if unit is not None}

@@ -9,12 +9,12 @@ from groundstation.base.failures import attempt
 from groundstation.base.findings import worst
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.chapters.assessed import not_assessed
-from groundstation.chapters.by_answer import answer_chapters
+from groundstation.chapters.by_answer import answer_chapters, loss_above
 from groundstation.chapters.chapter import Chapter, Chapters, Pairs
-from groundstation.chapters.parts import Cell, Facts, Front, Mark, Note, Tile
+from groundstation.chapters.parts import Cell, Facts, Front, Mark, Note, Section, Tile
 from groundstation.chapters.wording import ABSENT, clock, is_number, typeset
 from groundstation.results.flight import FlightResults, Status
-from groundstation.results.recorded import great_loss, recorded
+from groundstation.results.recorded import recorded
 
 HOUR_S = 3599.5  # rounds to an hour
 STATUS: dict[Status, Mark] = {
@@ -33,8 +33,11 @@ OF_PLANS = {
 }
 
 
-def front(results: FlightResults, chapters: Chapters) -> Front:
-    """The top of the report."""
+def front(results: FlightResults, chapters: Chapters, answers: Sequence[Section] | None = None) -> Front:
+    """Build the top of the report.
+
+    ``answers`` are the chapters on the answers of a flight where they are built already.
+    """
     if results.is_plan:
         return plan_front(results, _pairs_of_plan(results), chapters.plan)
     names = [results.metadata.get(key, "") for key in ("aircraft", "flight")]
@@ -42,12 +45,12 @@ def front(results: FlightResults, chapters: Chapters) -> Front:
     if results.is_session:
         tops = (one.front(results, _pairs(results)) for one in chapters.session if one.front is not None)
         return next(tops, Front(title, _pairs(results), RECORDED, _told(recorded(results))))
-    sections = answer_chapters(results, chapters)
+    sections = answer_chapters(results, chapters) if answers is None else answers
     tiles = [Tile(one.title, one.key, one.claim) for one in sections if one.claim is not None]
     left_open = tuple((one.title, one.headline) for one in sections if one.is_open)
     pairs, missing = _pairs(results), (*left_open, *not_assessed(results, chapters))
-    line, loss = _told(recorded(results)), great_loss(results)
-    if loss and not (tiles and tiles[0].claim.is_danger):
+    line = _told(recorded(results))
+    if loss := loss_above(results, tiles[0].claim if tiles else None):
         return Front(title, pairs, DATA_LOST, _told(loss), others=tiles, missing=missing, recorded=line)
     if not tiles:
         mark = RECORDED if results.status == "ok" else DAMAGED

@@ -64,7 +64,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     ),
     "watch": ("watch incoming -o out", "watch incoming -o out --once --every 5"),
     "report": ("report out", "report out --standard app-g -o acceptance"),
-    "view": ("view out", "view flight3.ulg --web"),
+    "view": ("view out", "view flight3.ulg --web", "view out --layout mine.rbl"),
     "export": (
         "export out/20260504T060000Z_SIM-1_101 -o flight.kml",
         "export flight3.ulg -o flight3.csv --track gnss",
@@ -196,6 +196,15 @@ WeatherFile = Annotated[
     typer.Option(
         "--weather",
         help="METAR lines (text): each flight takes the wind nearest to its taxi, within 60 min.",
+        metavar="FILE",
+        readable=False,
+    ),
+]
+Layout = Annotated[
+    Path | None,
+    typer.Option(
+        "--layout",
+        help="Layout saved in the viewer (blueprint, .rbl): recordings show it in place of the default tabs.",
         metavar="FILE",
         readable=False,
     ),

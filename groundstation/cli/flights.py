@@ -210,7 +210,7 @@ def comparison_text(found: "Comparison", *, everything: bool = False) -> str:
     The alignment of the clocks; answers, settings and findings that differ.
     """
     from groundstation.base.text_columns import columns
-    from groundstation.chapters.comparison import conclusion
+    from groundstation.chapters.comparison import conclusion, plain_name, subject
 
     alignment = found.alignment
     when = "" if alignment.event == "utc" else f" (A at {alignment.a_s:.1f} s, B at {alignment.b_s:.1f} s)"
@@ -222,10 +222,8 @@ def comparison_text(found: "Comparison", *, everything: bool = False) -> str:
     aligned = f"aligned on {alignment.event}{when}: clock of B {alignment.offset_s:+.3f} s{shared}"
     rows = [["answer", "A", "B", "B - A", "sigma", "1.96 sigma"]]
     for delta in found.deltas if everything else found.shown:
-        change, sigma = (_text(value) for value in (delta.delta, delta.sigma))
-        rows.append(
-            [printable(delta.name), _text(delta.a), _text(delta.b), change, sigma, SIGNIFICANCE[delta.is_significant]]
-        )
+        numbers = (_text(value) for value in (delta.a, delta.b, delta.delta, delta.sigma))
+        rows.append([printable(plain_name(delta)), *numbers, SIGNIFICANCE[delta.is_significant]])
     parts = [f"{columns(sides)}\n{aligned}", printable(conclusion(found).text), columns(rows, right=(1, 2, 3, 4))]
     if found.settings:
         pairs = [[printable(pair.name), _text(pair.a), _text(pair.b)] for pair in found.settings]
@@ -235,7 +233,7 @@ def comparison_text(found: "Comparison", *, everything: bool = False) -> str:
         ("B", found.findings_b, found.not_assessable_b),
     ):
         alone = [[finding.severity, printable(finding.text)] for finding in findings]
-        alone += [["not assessed", printable(f"{entry.analysis}: {entry.reason}")] for entry in reasons]
+        alone += [["not assessed", printable(f"{subject(entry.analysis)}: {entry.reason}")] for entry in reasons]
         if alone:
             parts.append(f"{letter} alone\n" + columns(alone))
     return "\n\n".join(parts)

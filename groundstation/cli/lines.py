@@ -13,9 +13,12 @@ MOST_NAMED = 4  # logs of a session
 LONGEST = 160  # characters of a line behind the name of the log
 STATES: Mapping[State, str] = {"data_lost": "data lost", "limit_reached": "at the limit", "incomplete": "incomplete"}
 GRADES: Mapping[str, str] = {
-    **dict.fromkeys(("accept", "accepted", "pass", "good", "agree", "stabilised"), "green"),
-    **dict.fromkeys(("reject", "refused", "fail", "wrong", "off", "not"), "red"),
-    **dict.fromkeys(("doubtful", "undecided", "ambiguous", "warn"), "yellow"),
+    **dict.fromkeys(("accept", "accepted", "pass", "good", "agree", "stabilised", "healthy", "consistent"), "green"),
+    **dict.fromkeys(("measured", "joined", "told"), "green"),
+    **dict.fromkeys(("reject", "refused", "fail", "failed", "bad", "wrong", "off", "not", "left GNSS"), "red"),
+    **dict.fromkeys(("data lost", "moved while aligning"), "red"),
+    **dict.fromkeys(("doubtful", "undecided", "ambiguous", "warn", "warning", "warnings", "filter wrong"), "yellow"),
+    **dict.fromkeys(("advisory", "extend", "too sure", "not stabilised", "they differ", "it or another"), "yellow"),
 }
 _BESIDE = re.compile(r" \([^()]*\)")
 
@@ -77,8 +80,10 @@ class Lines:
 
     def _show(self, outcome: Outcome, line: str) -> None:
         if self._is_shown and line:
-            word = re.match(r"\w+", line)
-            tell_line(self._name(outcome), line, GRADES.get(word.group()) if word else None)
+            found = re.match(r"[^:;,(]*", line)
+            phrase = found.group() if found else ""
+            verdict = next((one for one in (phrase, phrase.partition(" ")[0]) if one in GRADES), "")
+            tell_line(self._name(outcome), line, verdict, GRADES.get(verdict))
 
     def _name(self, outcome: Outcome) -> str:
         """Return the name of a log, its path where another of that name was told before."""
@@ -110,7 +115,9 @@ def line_of(outcome: Outcome, most: int | None = LONGEST) -> str:
     >>> len(line_of(Outcome("a.csv", "done", "word, " * 99, flight_id="A_1", was_finished=True)))
     156
     """
-    states = (STATES.get(outcome.state, ""), "finished before" if outcome.was_finished else "")
+    state = STATES.get(outcome.state, "")
+    is_told = outcome.text.startswith(f"{state}:")
+    states = ("" if is_told else state, "finished before" if outcome.was_finished else "")
     behind = [part for part in (", ".join(filter(None, states)), outcome.flight_id) if part]
     room = None if most is None else most - sum(2 + len(part) for part in behind)
     return "  ".join(part for part in (shortened(outcome.text, room), *behind) if part)

@@ -31,6 +31,7 @@ from groundstation.cli.application import (
     Isolate,
     Jobs,
     Json,
+    Layout,
     Only,
     Pdf,
     PowerUp,
@@ -140,6 +141,7 @@ def run(
             readable=False,
         ),
     ] = None,
+    layout: Layout = None,
     pdf: Pdf = False,
     only: Only = None,
     store: Store = "",
@@ -168,14 +170,21 @@ def run(
     from groundstation.pipeline.many_flights.runs.batch import run_many, run_together
     from groundstation.pipeline.many_flights.runs.dry_run import plan_many
     from groundstation.pipeline.many_flights.runs.references import judged_by
-    from groundstation.pipeline.one_flight.configuration import applying, installed_as, load_configuration
+    from groundstation.pipeline.one_flight.configuration import (
+        applying,
+        installed_as,
+        laid_out,
+        load_configuration,
+    )
     from groundstation.pipeline.one_flight.progress import silent
 
     refuse_pdf_of_results(only, pdf=pdf)
     settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd, weather, without)
     is_one_log = together or (len(paths) == 1 and not Path(paths[0]).is_dir())
     settings = installed_as(applying(settings, apply), installation)
-    configuration = judged_by(settings, reference or (), is_one_log=is_one_log)
+    if layout is not None and only == "results":
+        raise UsageError("--layout", "--only results", "recordings to lay out")
+    configuration = laid_out(judged_by(settings, reference or (), is_one_log=is_one_log), layout)
     if together and (dry_run or scheduler or stations is not None or timeout is not None or store or isolate):
         beside = "--dry-run, --scheduler, --stations, --timeout, --store or --isolate"
         raise UsageError("--together", beside, "--together without them")
@@ -304,14 +313,18 @@ def view(
         int | None,
         typer.Option("--port", help="Port. Default: 9090 for --web, else any free one.", min=1, max=65535),
     ] = None,
+    layout: Layout = None,
     power_up: PowerUp = None,
     profile: Profile = None,
     verbose: Verbose = False,
 ) -> int | None:
-    """Look at a flight in the Rerun viewer, native or in the browser."""
+    """Look at a flight in the Rerun viewer, native or in the browser.
+
+    `groundstation info` on a recording tells its size and the version of the viewer that opens it.
+    """
     from groundstation.pipeline.verbs.view import look_at
 
-    look_at(flight, web=web, host=host, port=port, power_up=power_up or 1, profile=profile, say=say)
+    look_at(flight, web=web, host=host, port=port, power_up=power_up or 1, profile=profile, layout=layout, say=say)
     return DONE
 
 

@@ -172,10 +172,10 @@ def check_text(checked: "ProfileCheck", *, everything: bool = False) -> str:
     from groundstation.pipeline.verbs.profiles import findings_of
 
     header = f"row {checked.header}" if checked.header else "none, by the profile's names"
+    width = counted(sum(one.is_first for one in checked.columns), "column")
     parts = [
         f"profile {checked.profile}, {checked.table}",
-        f"header {header}, {_parting(checked.delimiter)}, {counted(len(checked.columns), 'column')}, "
-        f"{counted(checked.rows, 'row')}, {checked.encoding}",
+        f"header {header}, {_parting(checked.delimiter)}, {width}, {counted(checked.rows, 'row')}, {checked.encoding}",
     ]
     used = [
         [one.name, one.became, "" if one.became == "time" else f"{one.values}", f"{one.shown} {one.unit}".strip()]

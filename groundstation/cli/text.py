@@ -21,15 +21,14 @@ def say(text: str) -> None:
     typer.echo(printable_lines(text), err=True)
 
 
-def tell_line(name: str, line: str, colour: str | None) -> None:
-    """Print a result at once, its first word in a colour where the terminal wants colours.
+def tell_line(name: str, line: str, verdict: str, colour: str | None) -> None:
+    """Print a result at once, its verdict in a colour where the terminal wants colours.
 
-    Not by typer's echo: that writes past a bar of progress on the same terminal.
+    The line begins with the verdict. Not by typer's echo: that writes past a bar of progress on the same terminal.
     """
     line = printable(line)
     if colour is not None and sys.stdout.isatty() and not os.environ.get("NO_COLOR"):
-        first, blank, rest = line.partition(" ")
-        line = typer.style(first, fg=colour) + blank + rest
+        line = typer.style(line[: len(verdict)], fg=colour) + line[len(verdict) :]
     print(printable(name), line, sep="  ", flush=True)
 
 

@@ -1,15 +1,18 @@
 """Flight in a notebook, from a log or from a flight folder."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
+from collections.abc import Mapping
 from functools import cached_property
 from html import escape
 from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from groundstation.base.clock import Clock
 from groundstation.base.errors import (
@@ -22,28 +25,25 @@ from groundstation.base.errors import (
 from groundstation.base.ledger import Ledger
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
-from groundstation.results.answer import A
+from groundstation.pipeline.answer_methods import AnswerMethods
+from groundstation.pipeline.logged_facts import events_frame, metadata_series, parameters_frame
+from groundstation.results.arrays.flight import PhaseSpans
 from groundstation.results.arrays.states import BodyStates
 from groundstation.results.flight import FlightResults, Source
-from groundstation.systems.heading.answer import HeadingResult
-from groundstation.systems.inertial.answer import InertialResult
-from groundstation.systems.inertial.forecast_answer import ForecastResult
-from groundstation.systems.latency.answer import Latencies
-from groundstation.systems.magnetic.answer import MagneticResult
-from groundstation.systems.magnetic.flux_answer import FluxDeviation
-from groundstation.systems.magnetic.ground_answer import GroundDeviation
-from groundstation.systems.trajectory.answer import BestTrajectory
 from groundstation.tables.table import Flight, Table, Tables, TimedTable, timed
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from groundstation.plots.plot import Plot
     from groundstation.results.files import SavedFlight
 
 AnyPath = str | PathLike[str]
 MOST_TOPICS = 12  # named in the card of a flight
+LINE, MOST_LINES = 100, 4  # characters and lines of the text of a flight
 
 
-class OpenFlight(ABC):
+class OpenFlight(AnswerMethods):
     """One flight in a notebook. All methods work alike for a log and for a flight folder."""
 
     @property
@@ -99,6 +99,10 @@ class OpenFlight(ABC):
         """
 
     @abstractmethod
+    def _logged(self) -> Mapping[str, str]:
+        """Return the metadata of the log, by name."""
+
+    @abstractmethod
     def _saved(self) -> "SavedFlight":
         """Return the flight as the report reads it."""
 
@@ -111,55 +115,52 @@ class OpenFlight(ABC):
         """
         return Tables(self.flight)
 
-    def heading(self) -> HeadingResult:
-        """Return the heading correction (system 1).
+    @cached_property
+    def parameters(self) -> "pd.DataFrame":
+        """Parameters of the autopilot as a frame by name; without rows where the log has none.
+
+        Columns: ``value``, ``default`` (NaN where the log does not tell it), ``differs`` from the default, ``first``,
+        ``changed`` while the log was recorded. Units are the autopilot's own.
+        """
+        return parameters_frame(self.flight)
+
+    @cached_property
+    def metadata(self) -> "pd.Series[str]":
+        """Facts that the log tells of itself, by name: vehicle, firmware, hardware, serials.
+
+        After these it has everything else as the log names it.
+        """
+        return metadata_series(self._logged())
+
+    @cached_property
+    def events(self) -> "pd.DataFrame":
+        """Events that the log names as a frame by time: markers, messages, modes.
+
+        Columns: ``time_s`` (flight seconds), ``topic``, ``name``, ``severity`` (info, warn, fail, or empty).
+        """
+        return events_frame(self.flight)
+
+    @property
+    def phases(self) -> "pd.DataFrame":
+        """Phases of the flight as a frame: start and end in flight seconds, with UTC beside."""
+        return self.results.to_frame(PhaseSpans.figure)
+
+    @property
+    def findings(self) -> "pd.DataFrame":
+        """Findings as a frame: severity, code, text with figures and units, topic, place."""
+        return self.results.to_frame("findings")
+
+    def utc(self, time_s: ArrayLike) -> "pd.DatetimeIndex":
+        """Return UTC of flight seconds, which answers give their times in; NaT for NaN.
 
         Raises
         ------
         NotAssessableError
-            When the data does not allow it; the message says why.
+            When the flight has no UTC.
         """
-        return self.answer(HeadingResult)
-
-    def inertial(self) -> InertialResult:
-        """Return the errors of the INS (system 2); raises as :meth:`heading`."""
-        return self.answer(InertialResult)
-
-    def forecast(self) -> ForecastResult:
-        """Return how far the INS can be trusted without GNSS; raises as :meth:`heading`."""
-        return self.answer(ForecastResult)
-
-    def latency(self) -> Latencies:
-        """Return how much later than the INS each sensor shows the motion.
-
-        Raises as :meth:`heading`.
-        """
-        return self.answer(Latencies)
-
-    def magnetic(self) -> MagneticResult:
-        """Return the deviation of the magnetic heading (system 3); raises as :meth:`heading`."""
-        return self.answer(MagneticResult)
-
-    def magnetic_ground(self) -> GroundDeviation:
-        """Return the error of the installed heading sensor on straight ground runs.
-
-        Raises as :meth:`heading`.
-        """
-        return self.answer(GroundDeviation)
-
-    def magnetic_flux(self) -> FluxDeviation:
-        """Return the deviation of a compass that gives heading alone, in flight.
-
-        Raises as :meth:`heading`.
-        """
-        return self.answer(FluxDeviation)
-
-    def trajectory(self) -> BestTrajectory:
-        """Return the best trajectory: state, accuracy, checks, errors of the on-board filter.
-
-        :meth:`states` has the trajectory itself. Raises as :meth:`heading`.
-        """
-        return self.answer(BestTrajectory)
+        if self.results.start_utc_ns is None:
+            raise NotAssessableError(self.source.name, "no UTC in this flight", "flight seconds")
+        return self.results.utc(np.atleast_1d(np.asarray(time_s, dtype=np.float64)))
 
     def states(self) -> TimedTable:
         """Return every state of the best trajectory with its sigmas, as a table.
@@ -182,23 +183,6 @@ class OpenFlight(ABC):
         columns = {name: Column(values) for name, values in kept.columns.items() if name != "time_s"}
         table = Table(of.states_name, time_ns, columns, np.arange(len(kept)), Column(time_ns))
         return timed(Flight({table.topic: table}, {}, start_ns, start_utc_ns is not None), table.topic)
-
-    def answer(self, kind: type[A]) -> A:
-        """Return the answer of any analysis, by its type.
-
-        Raises
-        ------
-        NotAssessableError
-            When the data does not allow it; the message says why.
-        """
-        found = self.results.answer(kind)
-        if found is not None:
-            return found
-        from groundstation.systems import systems
-
-        required = {one.answer: one.requires for one in systems().analyses}.get(kind, ())
-        reasons = self.results.reasons(kind.analysis) or self.results.reasons(*required)
-        raise NotAssessableError(kind.analysis, reasons[0] if reasons else "the log does not hold what it needs")
 
     @property
     def figures(self) -> dict[str, str]:
@@ -285,12 +269,17 @@ class OpenFlight(ABC):
             raise GroundstationError("the Rerun viewer", f"ended with code {code}", next_step="is there a display?")
         return None
 
+    def __dir__(self) -> list[str]:
+        """Return the public names: what a person may ask for."""
+        return sorted(name for name in super().__dir__() if not name.startswith("_") or name.startswith("__"))
+
     def __repr__(self) -> str:
         from groundstation.pipeline.one_flight.flight import sentence
 
         done = self.__dict__.get("results")
         told = f": {sentence(done)}" if done is not None else ""
-        return f"<{type(self).__name__} {self.source.name} ({self.source.reader}){told}>"
+        text = f"<{type(self).__name__} {self.source.name} ({self.source.reader}){told}>"
+        return "\n".join(wrap(text, LINE, max_lines=MOST_LINES, placeholder=" ...>", break_on_hyphens=False))
 
     def _repr_html_(self) -> str:
         """Return the top of the report as a short table: verdict, correction, span, topics."""

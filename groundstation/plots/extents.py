@@ -71,7 +71,7 @@ def _x_of(mark: AnyMark) -> Floats:
     if isinstance(mark, Intervals):
         return np.array([mark.value, *(mark.thin or ()), *(mark.thick or ())])
     if isinstance(mark, Outlines):
-        return np.concatenate([np.zeros(0), *(ring[:, 0] for ring in mark.rings)])
+        return np.concatenate([np.zeros(0), *(ring[:, 0] for ring in mark.rings if mark.makes_room)])
     return edges(mark.x) if isinstance(mark, Cells) else np.zeros(0)
 
 
@@ -88,7 +88,7 @@ def _y_of(mark: AnyMark) -> Floats:
     if isinstance(mark, Histogram):
         return np.append(mark.heights, 0.0)
     if isinstance(mark, Outlines):
-        return np.concatenate([np.zeros(0), *(ring[:, 1] for ring in mark.rings)])
+        return np.concatenate([np.zeros(0), *(ring[:, 1] for ring in mark.rings if mark.makes_room)])
     return edges(mark.y) if isinstance(mark, Cells) else np.zeros(0)
 
 

@@ -211,6 +211,7 @@ class Outlines(Mark):
     """Closed lines: ellipses, polygons, coasts. ``rings`` have shape (n, 2), horizontal first.
 
     ``magnified`` is how many times their size ellipses are drawn; ``is_filled`` fills them with a faint shade.
+    ``makes_room``: axes are long enough for them; else they are cut at the frame.
     """
 
     rings: tuple[Floats, ...]
@@ -218,6 +219,7 @@ class Outlines(Mark):
     is_filled: bool = False
     labels: tuple[str, ...] = ()
     dash: Dash = ""
+    makes_room: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,6 +25,13 @@ _AT_START: tuple[tuple[bytes, str], ...] = (
 )
 
 
+UNPACK = {  # archives that are not opened -> next step
+    "zip (or a spreadsheet)": "unpack it and give the log inside, or save the spreadsheet as CSV",
+    "bzip2": "unpack it (bunzip2) and give the log; gzip and zstd are read as they are",
+    "xz": "unpack it (unxz) and give the log; gzip and zstd are read as they are",
+}
+
+
 def recognise(source: Source) -> str | None:
     """Return the format that a file's first bytes show, None when they show none."""
     return next((name for magic, name in _AT_START if source.head.startswith(magic)), None)

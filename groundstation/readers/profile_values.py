@@ -19,7 +19,7 @@ def profile_text(path: Path) -> str:
     SettingsError
         When it cannot be read.
     """
-    return toml_text(path, str(path), "a profile", "check the path")
+    return toml_text(path, str(path), "a profile", "check the path; `groundstation profile list` has the names")
 
 
 def table_of(text: str, path: Path) -> dict[str, Any]:

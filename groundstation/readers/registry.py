@@ -286,9 +286,8 @@ def _unclaimed(
     if known in COMPRESSIONS and not source.compression:
         return UnclaimedLogError(source.name, f"{known} data that cannot be decompressed")
     if known is not None:
-        return UnclaimedLogError(
-            source.name, f"recognised as {known}, not readable in this version", "", f"convert it to {FLAT_CSV}"
-        )
+        found = f"recognised as {known}, not readable in this version"
+        return UnclaimedLogError(source.name, found, "", magic.UNPACK.get(known, f"convert it to {FLAT_CSV}"))
     if refusals:
         return refusals[0]
     if with_advice and not magic.is_binary(source):

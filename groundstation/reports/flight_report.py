@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from groundstation.base.failures import Failure, attempt, failures, gathered_failures
+from groundstation.chapters.by_answer import answer_chapters
 from groundstation.chapters.front import front
 from groundstation.chapters.parts import Document, Front
 from groundstation.reports.drawing import Drawing
@@ -132,9 +133,11 @@ def _put_pdf(document: Document, pdf: Path) -> str:
 
 def flight_document(saved: SavedFlight, systems: Systems) -> Document:
     """Return the report of a saved flight, session or plan, its figures drawn."""
-    kind = PLAN if saved.results.is_plan else SESSION if saved.results.is_session else "Flight report"
-    top = attempt("chapter", "front", front, saved.results, systems.chapters) or Front(saved.results.flight_id)
-    return Document(kind, saved.results.flight_id, top, flight_sections(saved, systems))
+    results = saved.results
+    kind = PLAN if results.is_plan else SESSION if results.is_session else "Flight report"
+    answers = None if results.is_plan or results.is_session else answer_chapters(results, systems.chapters)
+    top = attempt("chapter", "front", front, results, systems.chapters, answers) or Front(results.flight_id)
+    return Document(kind, results.flight_id, top, flight_sections(saved, systems, answers))
 
 
 def flight_report_html(document: Document, beside: str = "manifest.json") -> str:

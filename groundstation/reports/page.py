@@ -5,6 +5,7 @@ Nothing is loaded from outside.
 
 import base64
 import hashlib
+import re
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any
 from groundstation.chapters.wording import clean
 from groundstation.reports.live import Frame, LivePanel, page_data
 
+_WHOLE = re.compile(r"\b(?:(?:\d{8}T\d{6}Z|NOTIME_[0-9a-f]{8})[\w-]{0,32}|\d{4}-\d\d-\d\d)(?![\w-])")
 TEMPLATES = Path(__file__).parent / "templates"
 # Nothing may be loaded, nothing run but scripts that a template names by digest. SVG sets style attributes, hence
 # unsafe-inline.
@@ -53,11 +55,29 @@ def digest_of(script: str) -> str:
     return base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 
 
+def whole_ids(value: str) -> Any:
+    """Return escaped text in which no line breaks within a date, or the id of a flight.
+
+    Very long ids are as other words.
+
+    Examples
+    --------
+    >>> whole_ids("Rejected: 20260504T060000Z_SIM-1_101 <b>.")
+    Markup('Rejected: <span class="id">20260504T060000Z_SIM-1_101</span> &lt;b&gt;.')
+    """
+    from markupsafe import Markup, escape
+
+    text = clean(value)
+    if not _WHOLE.search(text):
+        return text
+    return Markup(_WHOLE.sub(r'<span class="id">\g<0></span>', str(escape(text))))
+
+
 @cache
 def _environment() -> Any:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    return Environment(
+    made = Environment(
         loader=FileSystemLoader(TEMPLATES),
         autoescape=True,
         undefined=StrictUndefined,
@@ -66,6 +86,8 @@ def _environment() -> Any:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
+    made.filters["ids"] = whole_ids
+    return made
 
 
 def _without_hidden_characters(value: Any) -> Any:

@@ -35,7 +35,9 @@ APPENDICES: dict[str, BuildWithChapters] = {
 }
 
 
-def flight_sections(saved: SavedFlight, systems: Systems) -> tuple[Section, ...]:
+def flight_sections(
+    saved: SavedFlight, systems: Systems, answers: Sequence[Section] | None = None
+) -> tuple[Section, ...]:
     """Return the chapters and appendices of a flight's report.
 
     The flight itself, what to do next, its answers, the best first, its data. Of a session of several aircraft, and of
@@ -43,19 +45,26 @@ def flight_sections(saved: SavedFlight, systems: Systems) -> tuple[Section, ...]
 
     A chapter that has nothing to say is left out, one of nothing but figures without arrays, and one that fails.
     """
-    chapters, appendices = told_sections(saved, systems)
+    chapters, appendices = told_sections(saved, systems, answers)
     numbered = _numbered(chapters, saved, systems, count(1))
     return (*numbered, *_numbered(appendices, saved, systems, ascii_uppercase))
 
 
-def told_sections(saved: SavedFlight, systems: Systems) -> tuple[list[Section], list[Section]]:
-    """Return the chapters and appendices of a report, no figure drawn."""
+def told_sections(
+    saved: SavedFlight, systems: Systems, answers: Sequence[Section] | None = None
+) -> tuple[list[Section], list[Section]]:
+    """Return the chapters and appendices of a report, no figure drawn.
+
+    ``answers`` are the chapters on the answers of a flight where they are built already.
+    """
     results = saved.results
     is_flight = not (results.is_session or results.is_plan)
+    if is_flight and answers is None:
+        answers = answer_chapters(results, systems.chapters)
     told = (
         (
             *_built_with_chapters(BEFORE_THE_ANSWERS, results, systems.chapters),
-            *answer_chapters(results, systems.chapters),
+            *(answers or ()),
             *_built(ON_THE_DATA, results),
         )
         if is_flight

@@ -42,7 +42,7 @@ def answer_of(answers: Answers, kind: type[A]) -> A | None:
     ...     analysis = "wind"
     ...     speed_mps: float
     >>> answer_of({}, Wind) is None, answer_of({"wind": Wind(3.0)}, Wind)
-    (True, Wind(speed_mps=3.0))
+    (True, <Wind speed_mps=3>)
     """
     found = answers.get(kind.analysis)
     return found if isinstance(found, kind) else None

@@ -26,6 +26,7 @@ READ_BY_FLEETS: Mapping[str, Kind] = {
             *("reference_residual_arcmin", "radial_error_rate_fit_nmiph", "forecast_60min_rms_m"),
             *("magnetic_before_rms_deg", "magnetic_after_rms_deg", "flux_before_rms_deg", "flux_after_rms_deg"),
             *("health_vibration_mps2", "health_hdop", "health_test_ratio"),
+            *("health_vibration_limit_mps2", "health_hdop_limit"),
             *("onboard_heading_rms_deg", "onboard_tilt_rms_deg"),
             *(
                 f"{sensor}{letter.lower()}{end}_deg"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.ellipse import ELLIPSE_95, magnified
+from groundstation.base.ellipse import ELLIPSE_95, fits, magnified
 from groundstation.results.flight import FlightResults
 
 FloatArray = NDArray[np.float64]
@@ -29,10 +29,15 @@ class CorrectedPosition:
         """Rows whose ellipses are drawn along a track, evenly spread."""
         return np.unique(np.linspace(0, len(self.time_s) - 1, SHOWN_ALONG).round().astype(np.int64))
 
-    def larger(self, side_m: float) -> int:
-        """Return the factor by which the 95 % ellipses are enlarged on a map of a given side."""
-        half_m = ELLIPSE_95 * np.hypot(self.sigma_north_m, self.sigma_east_m)[self.along()]
-        return magnified(side_m, half_m)
+    def drawn_on(self, side_m: float) -> tuple[NDArray[np.int64], int]:
+        """Return rows along a track with an ellipse on a map of that side, and its enlargement.
+
+        Ellipses of 95 % that are wider than the map have no room on it.
+        """
+        rows = self.along()
+        half_m = ELLIPSE_95 * np.hypot(self.sigma_north_m, self.sigma_east_m)[rows]
+        seen = fits(side_m, half_m)
+        return rows[seen], magnified(side_m, half_m[seen])
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.records import frozen
+from groundstation.base.unit_names import units_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,10 +48,15 @@ class FigureData:
         return self.columns[name]
 
     def to_frame(self) -> "pd.DataFrame":
-        """Pandas frame of the columns, in flight seconds as they are."""
+        """Pandas frame of the columns, in flight seconds as they are.
+
+        ``frame.attrs["units"]`` has the unit of each column that has one.
+        """
         import pandas as pd
 
-        return pd.DataFrame({name: values.copy() for name, values in self.columns.items()})
+        frame = pd.DataFrame({name: values.copy() for name, values in self.columns.items()})
+        frame.attrs["units"] = units_of(self.columns)
+        return frame
 
 
 class FigureSet(Sequence[FigureData]):

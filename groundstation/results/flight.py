@@ -17,7 +17,7 @@ from groundstation.results.answer import A, Answers, PlanAnswer, R, SessionAnswe
 from groundstation.results.arrays.typed import T
 from groundstation.results.chosen import ChosenInterval
 from groundstation.results.figures import FigureData, FigureSet, numbers
-from groundstation.results.frames import Tabular
+from groundstation.results.frames import RowsInside, Tabular, row_fields
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -151,6 +151,10 @@ class FlightResults(Tabular):
             return self.figures.names
         return tuple(figure.name for figure in self.figures)
 
+    @classmethod
+    def _tables(cls) -> Mapping[str, RowsInside]:
+        return {name: RowsInside(row, (name,)) for name, row in row_fields(cls).items()}
+
     def table_names(self) -> tuple[str, ...]:
         """Names that :meth:`to_frame` takes.
 
@@ -176,10 +180,10 @@ class FlightResults(Tabular):
         frame = figure.to_frame()
         if self.start_utc_ns is not None:
             for place, name in enumerate([name for name in UTC_OF if name in figure.columns]):
-                frame.insert(place, UTC_OF[name], self._utc(numbers(figure, name)))
+                frame.insert(place, UTC_OF[name], self.utc(numbers(figure, name)))
         return frame
 
-    def _utc(self, flight_seconds: NDArray[np.float64]) -> "pd.DatetimeIndex":
+    def utc(self, flight_seconds: NDArray[np.float64]) -> "pd.DatetimeIndex":
         """UTC of flight seconds, NaT where unknown."""
         import pandas as pd
 

@@ -46,7 +46,7 @@ from groundstation.store.info import COPY_NAME, StoreInfo
 from groundstation.store.marks import MAGIC, METADATA_NAME, PACKAGE
 
 LIBRARY = f"groundstation {__version__}"
-# Higher levels save 4 to 7 % of recorded flights and read random mantissas a quarter slower: docs/decisions/005.
+# Higher levels save 4 to 7 % of recorded flights and read random mantissas a quarter slower: docs/decisions/007.
 ZSTD_LEVEL = -1
 MEMORY_BYTES = 32 << 20  # finished chunks kept in memory; when there are more, all go to the spool
 MOST_ON_THEIR_WAY = 4  # chunks that wait for the thread which compresses and writes them

@@ -2,13 +2,14 @@
 
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.errors import NotAssessableError, UnknownNameError
+from groundstation.base.errors import NotAssessableError, UnknownNameError, UsageError
 from groundstation.base.records import BoolArray, Column, Int64Array, frozen
 from groundstation.base.signals import RAW_PREFIX, TOPICS, field_of, is_canonical, is_field_name, kind_of
 from groundstation.base.source_units import source_units
@@ -255,6 +256,42 @@ class TimedTable(Table):
             since = (self.time_ns - self.start_ns).astype("timedelta64[ns]")
             return frame.set_index(pd.TimedeltaIndex(since, name="flight_time"))
         return frame.set_index(pd.DatetimeIndex(self.time_ns.astype("datetime64[ns]"), tz="UTC", name="utc"))
+
+    def to_xarray(self) -> Any:
+        """Return the columns as an xarray Dataset over ``time``; absent numbers are NaN.
+
+        ``time`` is UTC (datetime64[ns], no time zone) or, without UTC, time since the start of the flight
+        (timedelta64[ns]); ``flight_time_s`` stands beside it. ``dataset["roll_deg"].attrs["units"]`` is the unit of a
+        variable.
+
+        Returns
+        -------
+        xarray.Dataset
+
+        Raises
+        ------
+        UsageError
+            When xarray is not installed.
+        """
+        if find_spec("xarray") is None:
+            raise UsageError(f"table {self.topic}", "no package xarray", "", "pip install 'groundstation[xarray]'")
+        import pandas as pd
+
+        since = (self.time_ns - self.start_ns).astype("timedelta64[ns]")
+        columns = {"flight_time_s": self.flight_time_s, **{name: self._plain(name) for name in self.columns}}
+        times = pd.Index(self.utc if self.has_utc else since, name="time")
+        dataset = pd.DataFrame(columns, index=times).to_xarray().set_coords("flight_time_s")
+        for name, unit in {**self.units, "flight_time_s": "s"}.items():
+            dataset[name].attrs["units"] = unit
+        dataset.attrs |= {"topic": self.topic, "time": "UTC" if self.has_utc else "since the start of the flight"}
+        return dataset
+
+    def _plain(self, name: str) -> NDArray[Any]:
+        """Return a column as it is; as float64 where a number is absent somewhere."""
+        column = self.columns[name]
+        if column.values.dtype.kind == "U":
+            return self.text(name)
+        return np.array(column.values) if bool(column.mask.all()) else np.where(column.mask, column.values, np.nan)
 
 
 @dataclass(frozen=True, repr=False)

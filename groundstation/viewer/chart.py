@@ -6,6 +6,7 @@ what they are.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from textwrap import wrap
 
 import numpy as np
 import rerun as rr
@@ -28,7 +29,8 @@ TIME_STEPS_S = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 1
 MOST_DECADES = 3  # of an axis on which twos and fives are written, too
 GRID, LABEL = 0.4, 0.1  # widths and radii in points of the screen
 KEY_ROOM, MOST_KEY_ROOM, LETTER = 56.0, 110.0, 4.4  # beside the box, for the names of many lines
-MOST_ABOVE, MOST_LETTERS, MOST_OF_A_NAME = 4, 60, 25  # names above the box, their letters; letters of one beside it
+MOST_ABOVE, MOST_LETTERS, MOST_OF_A_NAME = 4, 60, 25  # names above the box, their letters; letters of a row beside it
+MOST_ROWS, MOST_WRAPPED = 3, 6  # rows of a name beside the box, where there are no more than so many names
 BAND_COLUMNS, FINE = 320, 0.8  # upright lines of a filled band across the whole box; breadth of a line of a box
 CURSOR, CURSOR_STEPS = 0.6, 300  # radius in points of the screen; places of a run
 MOST_PLACES = 600  # of a mark that moves
@@ -154,7 +156,10 @@ class Chart:
         else:
             step = WIDTH / max(len(lines), 1)
             places = [[step * (place + 0.5), -11.0] for place in range(len(lines))]
-        names = [clean_text(line.name, MOST_OF_A_NAME if self.right > RIGHT else MOST_LETTERS) for line in lines]
+        names = [clean_text(line.name, MOST_LETTERS) for line in lines]
+        if self.right > RIGHT:
+            rows = MOST_ROWS if len(lines) <= MOST_WRAPPED else 1
+            names = ["\n".join(wrap(name, MOST_OF_A_NAME, max_lines=rows, placeholder=" ...")) for name in names]
         self.texts("legend", np.array(places), names, [line.colour for line in lines])
 
     def curves(

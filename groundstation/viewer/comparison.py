@@ -7,7 +7,6 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
-from groundstation.base.failures import attempt
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.chapters.comparison import answers, findings, opening, settings
 from groundstation.chapters.markdown import markdown, part_markdown
@@ -16,10 +15,11 @@ from groundstation.chapters.plots.comparison import COMPARED, PlottedSide, Tell,
 from groundstation.results.comparison import Comparison
 from groundstation.results.files import SavedFlight
 from groundstation.systems.system import Systems
+from groundstation.viewer.held_stream import HeldStream
 from groundstation.viewer.names import clean_text
 from groundstation.viewer.plot_views import panels_of
 from groundstation.viewer.recorder import Recorder
-from groundstation.viewer.recording import NamedTab, save_stream, send_layout
+from groundstation.viewer.recording import NamedTab, save_stream, send_tabs
 from groundstation.viewer.views import document
 
 Rows = tuple[tuple[str, ...], ...]  # names of plots, side by side in rows
@@ -56,22 +56,22 @@ def send_comparison(
     """
     has_utc = comparison.alignment.event == "utc" and comparison.a.start_utc is not None
     start_ns = iso_to_utc_ns(str(comparison.a.start_utc))[0] if has_utc else 0
-    recorder = Recorder(stream, start_ns, has_utc, systems)
+    held = HeldStream(stream)
+    recorder = Recorder(held.stream, start_ns, has_utc, systems)
     stream.send_recording_name(clean_text(f"{comparison.a.flight_id} | {comparison.b.flight_id}"))
     sides = sides_of(comparison, a, b)
-    recorder.document("comparison", comparison_text(comparison))
-    tabs = (attempt("tab", name, tab) for name, tab in _tabs(recorder, sides))
-    return send_layout(stream, [tab for tab in tabs if tab is not None])
+    return send_tabs(stream, held, _tabs(recorder, comparison, sides))
 
 
-def _tabs(recorder: Recorder, sides: Sequence[PlottedSide]) -> Iterator[NamedTab]:
+def _tabs(recorder: Recorder, comparison: Comparison, sides: Sequence[PlottedSide]) -> Iterator[NamedTab]:
     """Tabs in their order: the name of each and what logs it."""
-    yield "overview", partial(_overview, recorder, sides)
+    yield "overview", partial(_overview, recorder, comparison, sides)
     for one in recorder.systems.compared:
         yield one.name, partial(_grid, one.rows, one.title, recorder, sides, one.figures)
 
 
-def _overview(recorder: Recorder, sides: Sequence[PlottedSide]) -> rrb.Container:
+def _overview(recorder: Recorder, comparison: Comparison, sides: Sequence[PlottedSide]) -> rrb.Container:
+    recorder.document("comparison", comparison_text(comparison))
     text = document("A and B", "comparison")
     ground = panels_of(recorder, COMPARED["tracks"](sides), of="Tracks")
     left = rrb.Vertical(contents=[*ground, text]) if ground else text

@@ -4,12 +4,12 @@ Its timelines are ``utc`` and ``flight_number``.
 """
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import rerun as rr
 import rerun.blueprint as rrb
 
-from groundstation.base.failures import attempt
 from groundstation.chapters.plots.fleet.trend import HEADING
 from groundstation.results.fleet import FleetResults
 from groundstation.systems.system import Systems
@@ -18,12 +18,14 @@ from groundstation.viewer.fleet_charts import (
     ChartedAircraft,
     aircraft_of,
     by_aircraft,
+    is_judged,
     log_aircraft,
     verdicts,
 )
 from groundstation.viewer.fleet_density import heading_error_density
 from groundstation.viewer.fleet_recorder import FLIGHT_NUMBER, FleetRecorder
 from groundstation.viewer.fleet_text import aircraft_text, failed_text, flights_text
+from groundstation.viewer.held_stream import HeldStream
 from groundstation.viewer.recording import save_stream, send_layout
 from groundstation.viewer.views import document
 
@@ -51,42 +53,54 @@ def write_fleet_recording(path: Path, fleet: FleetResults, systems: Systems) -> 
 
 
 def send_fleet(stream: rr.RecordingStream, fleet: FleetResults, systems: Systems) -> rrb.Blueprint:
-    """Log a fleet to a stream that has its sink, and send the layout.
+    """Log a fleet to a stream that has its sink, its layout first.
 
     Waits until all is out; returns the layout.
     """
-    recorder = FleetRecorder(stream, fleet, systems)
+    held = HeldStream(stream)
+    recorder = FleetRecorder(held.stream, fleet, systems)
     stream.send_recording_name("Fleet")
-    logged = (attempt("aircraft", one.name, _logged, recorder, fleet, one) for one in aircraft_of(fleet))
+    logged = (held.attempt("aircraft", one.name, partial(_logged, recorder, fleet, one)) for one in aircraft_of(fleet))
     found = [one for one in logged if one is not None]
     tabs = [
-        *(attempt("tab", name, tab, recorder, fleet, found) for name, tab in TABS.items()),
-        *(attempt("tab", tab.name, tab.log, recorder, fleet) for tab in systems.fleet_tabs),
-        *(attempt("tab", name, tab, recorder, fleet, found) for name, tab in TABS_BEHIND.items()),
+        *(held.attempt("tab", name, partial(tab, recorder, fleet, found)) for name, tab in TABS.items()),
+        *(held.attempt("tab", tab.name, partial(tab.log, recorder, fleet)) for tab in systems.fleet_tabs),
+        *(held.attempt("tab", name, partial(tab, recorder, fleet, found)) for name, tab in TABS_BEHIND.items()),
     ]
     shown = [tab for tab in tabs if tab is not None]
-    return send_layout(stream, shown, timeline=FLIGHT_NUMBER)  # on utc, the flights of a year are a few columns of dots
+    layout = send_layout(stream, shown, timeline=FLIGHT_NUMBER)  # on utc, the flights of a year are columns of dots
+    held.release()
+    return layout
 
 
-def _logged(recorder: FleetRecorder, fleet: FleetResults, one: ChartedAircraft) -> Logged:
-    return one, log_aircraft(recorder, fleet, one)
+def _logged(recorder: FleetRecorder, fleet: FleetResults, one: ChartedAircraft) -> Logged | None:
+    """Log an aircraft; None for one that no flight judged or measured."""
+    views = log_aircraft(recorder, fleet, one)
+    return (one, views) if views or is_judged(fleet, one) else None
 
 
-def _fleet(recorder: FleetRecorder, fleet: FleetResults, found: list[Logged]) -> rrb.Container:
+def _fleet(recorder: FleetRecorder, fleet: FleetResults, found: list[Logged]) -> rrb.Container | None:
+    """Log what all aircraft have in common; None where there is neither a figure nor a table."""
     aircraft = [one for one, _ in found]
-    recorder.document("by_aircraft", aircraft_text(fleet, {one.name: one.entity for one in aircraft}, recorder.systems))
+    text = aircraft_text(fleet, {one.name: one.entity for one in aircraft}, recorder.systems)
+    judged = [one for one in aircraft if is_judged(fleet, one)]
     errors = by_aircraft([one for one, views in found if HEADING in views], HEADING)
-    plots = [*errors, *([verdicts(aircraft)] if aircraft else [])]
-    answer = [document("By aircraft", "by_aircraft"), *heading_error_density(recorder, fleet)]
-    columns = [rrb.Vertical(contents=answer)]
+    plots = [*errors, *([verdicts(judged)] if judged else [])]
+    answer = heading_error_density(recorder, fleet)
+    if text:
+        recorder.document("by_aircraft", text)
+        answer = [document("By aircraft", "by_aircraft"), *answer]
+    columns = [rrb.Vertical(contents=answer)] if answer else []
     if plots:
         columns.append(rrb.Vertical(contents=plots, row_shares=[3.0, 1.0][: len(plots)]))
+    if not columns:
+        return None
     return rrb.Horizontal(contents=columns, name="Fleet")
 
 
-def _aircraft(_recorder: FleetRecorder, _fleet: FleetResults, found: list[Logged]) -> rrb.Container | None:
+def _aircraft(_recorder: FleetRecorder, fleet: FleetResults, found: list[Logged]) -> rrb.Container | None:
     own = [
-        rrb.Vertical(contents=[*views.values(), verdicts([one])], name=one.label)
+        rrb.Vertical(contents=[*views.values(), *([verdicts([one])] if is_judged(fleet, one) else [])], name=one.label)
         for one, views in found[:MOST_AIRCRAFT]
     ]
     return rrb.Tabs(contents=own, name="Aircraft") if own else None

@@ -1,7 +1,7 @@
 """Charts of a fleet by flight number: the plots of its page, and verdict lanes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import rerun.blueprint as rrb
@@ -9,8 +9,8 @@ import rerun.blueprint as rrb
 from groundstation.chapters.fleet.common import title_of
 from groundstation.chapters.fleet.trend import QUANTITIES
 from groundstation.chapters.plots.fleet.trend import HEADING, POSITIVE, chart
-from groundstation.plots.marks import Role, series
-from groundstation.plots.plot import Axis
+from groundstation.plots.marks import Curve, Role, series
+from groundstation.plots.plot import Axis, Panel
 from groundstation.results.fleet import FleetResults
 from groundstation.viewer import colours
 from groundstation.viewer.colours import Colour
@@ -53,18 +53,31 @@ def aircraft_of(fleet: FleetResults) -> tuple[ChartedAircraft, ...]:
     )
 
 
+def is_judged(fleet: FleetResults, aircraft: ChartedAircraft) -> bool:
+    """Tell whether any flight of an aircraft has a verdict on its heading."""
+    flights = fleet.flights
+    return bool((flights["verdict"][flights["aircraft"] == aircraft.name] != "").any())
+
+
 def log_aircraft(recorder: FleetRecorder, fleet: FleetResults, aircraft: ChartedAircraft) -> dict[str, rrb.View]:
     """Log the figures of an aircraft and its verdicts; the views of the quantities it has."""
     flights = fleet.flights
     rows = recorder.order[(flights["aircraft"] == aircraft.name)[recorder.order]]
     states = [str(verdict) or "not assessed" for verdict in flights["verdict"][rows].tolist()]
-    recorder.lane(f"{aircraft.entity}/verdict", recorder.numbers(flights["flight_id"][rows]), states, VERDICTS)
+    if is_judged(fleet, aircraft):
+        recorder.lane(f"{aircraft.entity}/verdict", recorder.numbers(flights["flight_id"][rows]), states, VERDICTS)
     views = {}
     for quantity, name in PATHS.items():
         told = chart(fleet, quantity, aircraft.name, BY_NUMBER, recorder.places, aircraft.label, aircraft.role)
         if told is not None:
-            views[quantity] = over_time(recorder, f"{aircraft.entity}/{name}", told, _title(quantity))
+            views[quantity] = over_time(recorder, f"{aircraft.entity}/{name}", _alone(told), _title(quantity))
     return views
+
+
+def _alone(told: Panel) -> Panel:
+    """Return the chart of an aircraft on a page of its own: without a level, the axis holds its intervals too."""
+    has_level = any(isinstance(mark, Curve) for mark in told.marks)
+    return replace(told, legend="", y=told.y if has_level else replace(told.y, low=None, high=None))
 
 
 def _title(quantity: str) -> str:

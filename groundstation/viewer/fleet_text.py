@@ -13,7 +13,7 @@ from groundstation.base.failures import attempt
 from groundstation.chapters.fleet import flights, rest
 from groundstation.chapters.fleet.common import aircraft_name, plural
 from groundstation.chapters.markdown import markdown
-from groundstation.chapters.parts import Note, Section, shortened
+from groundstation.chapters.parts import Grid, Note, Section, shortened
 from groundstation.results.fleet import FleetResults
 from groundstation.systems.system import Systems
 from groundstation.viewer.fleet_recorder import FleetRecorder
@@ -29,10 +29,13 @@ LINKS = (
 
 
 def aircraft_text(fleet: FleetResults, entities: Mapping[str, str], systems: Systems) -> str:
-    """Return what is told by aircraft, each a link to its entity."""
+    """Return what is told by aircraft, each a link to its entity; empty where there is no table."""
     names = {aircraft_name(name): f"recording://{entity}" for name, entity in entities.items() if name}
     links = {name: link for name, link in names.items() if link.isascii()}
-    return "\n\n".join(text_of(section, links) for section in _of_panel("aircraft", fleet, systems))
+    sections = list(_of_panel("aircraft", fleet, systems))
+    if not any(isinstance(part, Grid) for section in sections for part in section.parts):
+        return ""
+    return "\n\n".join(text_of(section, links) for section in sections)
 
 
 def _of_panel(panel: str, fleet: FleetResults, systems: Systems) -> Iterator[Section]:

@@ -7,6 +7,8 @@ minor version. Rerun is imported inside the functions: opening its viewer does w
 import importlib.util
 import re
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -77,9 +79,18 @@ def catalog_client(url: str) -> "CatalogClient":
 
 
 def send_blueprint(stream: "rr.RecordingStream", blueprint: "rrb.Blueprint") -> None:
-    """Send a layout to a stream, and close the stream that the layout is made in.
+    """Send a layout to a stream, and close the stream that the layout is made in."""
+    with new_blueprint(stream) as made:
+        made.set_time("blueprint", sequence=0)
+        blueprint._log_to_stream(made)
+        send_made(stream, made)
 
-    Rerun 0.41 leaves that one open: two threads and their buffers stay for each recording of a process.
+
+@contextmanager
+def new_blueprint(stream: "rr.RecordingStream") -> "Iterator[rr.RecordingStream]":
+    """Yield a stream to make the layout of a recording in, and close it.
+
+    Rerun 0.41 leaves its own open: two threads and their buffers stay for each recording of a process.
     """
     import rerun as rr
     import rerun_bindings
@@ -93,12 +104,16 @@ def send_blueprint(stream: "rr.RecordingStream", blueprint: "rrb.Blueprint") -> 
         )
     )
     try:
-        made.set_time("blueprint", sequence=0)
-        blueprint._log_to_stream(made)
-        storage = made.memory_recording().storage
-        rerun_bindings.send_blueprint(storage, True, True, recording=stream.to_native())
+        yield made
     finally:
         made.disconnect()
+
+
+def send_made(stream: "rr.RecordingStream", made: "rr.RecordingStream") -> None:
+    """Send a layout that was made: it is that of the recording, and what is shown."""
+    import rerun_bindings
+
+    rerun_bindings.send_blueprint(made.memory_recording().storage, True, True, recording=stream.to_native())
 
 
 def forget_closed() -> None:

@@ -81,6 +81,7 @@ def open_viewer(
     host: str = LOCAL,
     port: int | None = None,
     headless: bool = False,
+    links: Path | None = None,
     say: Callable[[str], None] = lambda _: None,
 ) -> int:
     """Open a recording, or the address of a catalog, and wait until the viewer is closed.
@@ -100,6 +101,8 @@ def open_viewer(
         everything else any free one.
     headless : bool
         No window; with ``web``: no browser is opened.
+    links : Path, optional
+        Folder where the links of fleet.rrd begin; left out: that of the recording.
     say : callable
         Takes the address of the page of a recording.
 
@@ -118,7 +121,7 @@ def open_viewer(
         if not what.is_file():
             raise GroundstationError(str(what), "no such file", next_step="run the log first")
         what = what.absolute()
-        folder = what.parent  # where the links of fleet.rrd begin
+        folder = links or what.parent
         if web:
             return _open_page(what, host, port, headless=headless, say=say)
     command = viewer_command(what, web=web, host=host, port=port, headless=headless)

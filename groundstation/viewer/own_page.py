@@ -155,6 +155,9 @@ class _Visitor(BaseHTTPRequestHandler):
     server_version, sys_version = "groundstation", ""
     timeout = 60.0
 
+    def do_HEAD(self) -> None:
+        self.do_GET()
+
     def do_GET(self) -> None:
         hosts = self.headers.get_all("Host", [])
         if len(hosts) != 1 or not is_own_name(hosts[0]):
@@ -167,8 +170,9 @@ class _Visitor(BaseHTTPRequestHandler):
         elif asked.path in self.server.files:
             kind, content = self.server.files[asked.path]
             self._answer(http.HTTPStatus.OK, len(content), Content_Type=kind, **{LENGTH_HEADER: str(len(content))})
-            with suppress(OSError):  # a visitor who leaves
-                self.wfile.write(content)
+            if self.command == "GET":
+                with suppress(OSError):  # a visitor who leaves
+                    self.wfile.write(content)
         elif unquote(asked.path) == f"/{self.server.recording.name}":
             self._send_recording()
         else:
@@ -192,8 +196,9 @@ class _Visitor(BaseHTTPRequestHandler):
             status = http.HTTPStatus.PARTIAL_CONTENT if wish else http.HTTPStatus.OK
             self._answer(status, end - start, Content_Type=BINARY, Accept_Ranges="bytes", **told)
             file.seek(start)
-            with suppress(OSError):
-                self._copy(file.read, end - start)
+            if self.command == "GET":
+                with suppress(OSError):
+                    self._copy(file.read, end - start)
 
     def _copy(self, read: Callable[[int], bytes], length: int) -> None:
         while length > 0 and (block := read(min(length, 1 << 18))):

@@ -10,10 +10,11 @@ from groundstation.results.answer import PlanAnswer
 from groundstation.results.flight import FlightResults
 from groundstation.systems.system import Systems
 from groundstation.tables.table import Flight
+from groundstation.viewer.held_stream import HeldStream
 from groundstation.viewer.names import clean_text
 from groundstation.viewer.properties import send_properties
 from groundstation.viewer.recorder import Recorder
-from groundstation.viewer.recording import answer_tabs, logged, save_stream, send_layout
+from groundstation.viewer.recording import answer_tabs, save_stream, send_tabs, with_log
 
 
 def write_plan_recording(path: Path, results: FlightResults, systems: Systems) -> None:
@@ -30,10 +31,11 @@ def write_plan_recording(path: Path, results: FlightResults, systems: Systems) -
 
 
 def send_plan(stream: rr.RecordingStream, results: FlightResults, systems: Systems) -> rrb.Blueprint:
-    """Log everything to a stream that has its sink and send the layout; returns the layout."""
-    recorder = Recorder(stream, 0, has_utc=False, systems=systems)
+    """Log everything to a stream that has its sink with its layout first; returns the layout."""
+    held = HeldStream(stream)
+    recorder = Recorder(held.stream, 0, has_utc=False, systems=systems)
     stream.send_recording_name(clean_text(results.flight_id))
     attempt("properties", "results", send_properties, stream, results)
     clock = Flight({}, results.metadata)  # findings have places in time alone
     tabs = answer_tabs(PlanAnswer, recorder, results)
-    return send_layout(stream, logged(tabs, recorder, clock, results))
+    return send_tabs(stream, held, with_log(tabs, recorder, clock, results))

@@ -24,6 +24,7 @@ from groundstation.viewer.series import FloatArray, gap_after
 from groundstation.viewer.views import document, lanes, plot
 
 MOST_TOLD = 90  # characters of a title that says colours; a longer one would be cut
+ONE_DOT = colours.DOT["bold"]
 SAME = 1e-9  # of a half width: the middle of a band is the line that it is about
 
 
@@ -184,11 +185,15 @@ def over_time(recorder: Recorder, path: str, panel: Panel, title: str) -> rrb.Vi
             named.append(Line(clean_text(mark.name), line.colour))
     for number, group in enumerate(groups):
         time_ns = recorder.time_ns(group.time_s)
+        if len(time_ns) == 1:  # a line of one moment would not be seen
+            for place, (values, line) in enumerate(zip(group.values, group.lines, strict=True)):
+                recorder.dots(f"{path}/f{number:02d}_dots/{place}", time_ns, values, replace(line, width=ONE_DOT))
+            continue
         values = np.column_stack(group.values)
         recorder.lines(f"{path}/b{number:02d}_lines", time_ns, values, group.lines, gap_after(time_ns))
     _limits(recorder, f"{path}/a_limits", panel, limits, unit, title)
     named += [Line(clean_text(mark.name), colours.ROLES[mark.role]) for mark in limits if mark.name]
-    told = _title(title, named) if panel.legend else title
+    told = _title(title, named) if panel.legend else _title_beside(title, named)
     return plot(told or title, path, axis_range=_range(panel), legend=not told)
 
 
@@ -298,6 +303,12 @@ def _title(title: str, named: Sequence[Line]) -> str:
     names = {line.colour: list(dict.fromkeys(one.name for one in named if one.colour == line.colour)) for line in named}
     told = f"{title}: " + "; ".join(f"{', '.join(of)} {colours.WORDS[shade]}" for shade, of in names.items())
     return told if len(told) <= MOST_TOLD else ""
+
+
+def _title_beside(title: str, named: Sequence[Line]) -> str:
+    """Return the title of a panel that leaves its legend to one beside it: with the colours if there are several."""
+    is_one = len({line.colour for line in named}) < 2
+    return title if is_one else _title(title, named) or title
 
 
 def _lanes(recorder: Recorder, panels: Sequence[tuple[str, str, Panel]]) -> rrb.View:

@@ -23,10 +23,12 @@ from groundstation.results.answer import Answer
 from groundstation.results.flight import FlightResults
 from groundstation.systems.system import Systems
 from groundstation.tables.table import Flight
+from groundstation.viewer.held_stream import FLUSH_SECONDS, HeldStream
 from groundstation.viewer.inner import forget_closed, send_blueprint
 from groundstation.viewer.names import clean_text
 from groundstation.viewer.properties import send_properties
 from groundstation.viewer.recorder import FLIGHT_TIME, Recorder
+from groundstation.viewer.saved_layout import send_layout_content
 from groundstation.viewer.tabs.generic import generic_tab
 from groundstation.viewer.tabs.log import log
 from groundstation.viewer.tabs.overview import overview
@@ -37,10 +39,10 @@ APPLICATION = "groundstation"
 DEFAULT_VIEWER_URL = "rerun+http://127.0.0.1:9876/proxy"
 DEFAULT_PORT = 9876
 NamedTab = tuple[str, Callable[[], rrb.Container | None]]
-CONNECT_SECONDS, FLUSH_SECONDS = 3.0, 60.0
+CONNECT_SECONDS = 3.0
 
 
-def write_recording(path: Path, flight: Flight, results: FlightResults, systems: Systems) -> None:
+def write_recording(path: Path, flight: Flight, results: FlightResults, systems: Systems, layout: bytes = b"") -> None:
     """Write the recording of one flight, blueprint embedded.
 
     Parameters
@@ -51,13 +53,15 @@ def write_recording(path: Path, flight: Flight, results: FlightResults, systems:
     results : FlightResults
     systems : Systems
         Those whose tabs it has.
+    layout : bytes
+        A saved layout in place of the default one; empty: none.
 
     Raises
     ------
     GroundstationError
         When Rerun refused the data or the file could not be written.
     """
-    save_stream(path, results.flight_id, lambda stream: send_flight(stream, flight, results, systems))
+    save_stream(path, results.flight_id, lambda stream: send_flight(stream, flight, results, systems, layout))
 
 
 def save_stream(path: Path, identity: str, send: Callable[[rr.RecordingStream], object]) -> None:
@@ -119,17 +123,21 @@ def _expect_viewer(url: str) -> None:
         ) from error
 
 
-def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResults, systems: Systems) -> rrb.Blueprint:
+def send_flight(
+    stream: rr.RecordingStream, flight: Flight, results: FlightResults, systems: Systems, layout: bytes = b""
+) -> rrb.Blueprint:
     """Log everything to a stream that has its sink, and return the layout.
 
-    The layout is sent, and the call returns when all is out.
+    The layout is sent first, or a saved one in its place; the call returns when all is out.
     """
-    recorder = Recorder(stream, flight.start_ns, flight.has_utc, systems)
+    held = HeldStream(stream)
+    recorder = Recorder(held.stream, flight.start_ns, flight.has_utc, systems)
     stream.send_recording_name(clean_text(results.flight_id))
     attempt("properties", "results", send_properties, stream, results)
     if flight.has_utc:
         stream.send_recording_start_time_nanos(flight.start_ns)
-    return send_layout(stream, logged(tabs_of(recorder, flight, results), recorder, flight, results))
+    tabs = with_log(tabs_of(recorder, flight, results), recorder, flight, results)
+    return send_tabs(stream, held, tabs, layout)
 
 
 def tabs_of(recorder: Recorder, flight: Flight, results: FlightResults) -> Iterator[NamedTab]:
@@ -140,12 +148,29 @@ def tabs_of(recorder: Recorder, flight: Flight, results: FlightResults) -> Itera
     yield "raw", partial(raw, recorder, flight, results)
 
 
-def logged(tabs: Iterable[NamedTab], recorder: Recorder, flight: Flight, results: FlightResults) -> list[rrb.Container]:
-    """Log tabs and, behind them, the log, which tells of those that failed and are left out."""
-    shown = [attempt("tab", name, tab) for name, tab in tabs]
-    told = replace(results, findings=with_failures(results.findings, failures()))
-    shown.append(attempt("tab", "log", log, recorder, flight, told))
-    return [tab for tab in shown if tab is not None]
+def with_log(
+    tabs: Iterable[NamedTab], recorder: Recorder, flight: Flight, results: FlightResults
+) -> Iterator[NamedTab]:
+    """Tabs and, behind them, the log, which tells of those that failed and are left out."""
+    yield from tabs
+    yield "log", partial(_log, recorder, flight, results)
+
+
+def _log(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Container:
+    return log(recorder, flight, replace(results, findings=with_failures(results.findings, failures())))
+
+
+def send_tabs(
+    stream: rr.RecordingStream, held: HeldStream, tabs: Iterable[NamedTab], layout: bytes = b""
+) -> rrb.Blueprint:
+    """Let tabs log in their order, send the layout, then what they logged; returns their layout.
+
+    A saved ``layout`` is sent in its place.
+    """
+    shown = [held.attempt("tab", name, tab) for name, tab in tabs]
+    own = send_layout(stream, [tab for tab in shown if tab is not None], saved=layout)
+    held.release()
+    return own
 
 
 def answer_tabs(kind: type[Answer] | None, recorder: Recorder, results: FlightResults) -> Iterator[NamedTab]:
@@ -170,22 +195,25 @@ def _generic(names: Iterable[str], recorder: Recorder, results: FlightResults) -
 
 
 def send_layout(
-    stream: rr.RecordingStream, tabs: Sequence[rrb.Container], *, timeline: str = FLIGHT_TIME
+    stream: rr.RecordingStream, tabs: Sequence[rrb.Container], *, timeline: str = FLIGHT_TIME, saved: bytes = b""
 ) -> rrb.Blueprint:
-    """Send the layout of a recording, and wait until all is out.
+    """Send the layout of a recording, or a saved one; returns its own.
 
-    Its panels are closed and its time stands still.
+    In its own, the panels are closed and time stands still.
     """
     blueprint = rrb.Blueprint(
-        rrb.Tabs(contents=tabs, active_tab=0),
+        rrb.Tabs(contents=tabs, active_tab=0 if tabs else None),
         rrb.TimePanel(state="collapsed", timeline=timeline, play_state="paused"),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         auto_layout=False,
         auto_views=False,
     )
-    send_blueprint(stream, blueprint)
-    stream.flush(timeout_sec=FLUSH_SECONDS)
+    if saved:
+        send_layout_content(stream, saved)
+    else:
+        send_blueprint(stream, blueprint)
+    stream.flush(timeout_sec=FLUSH_SECONDS)  # else data that are sent next may overtake a part of it
     return blueprint
 
 

@@ -11,10 +11,11 @@ from groundstation.results.flight import FlightResults
 from groundstation.systems.system import Systems
 from groundstation.tables.session_assemble import AssembledSession
 from groundstation.tables.table import Flight
+from groundstation.viewer.held_stream import HeldStream
 from groundstation.viewer.names import clean_text
 from groundstation.viewer.properties import send_properties
 from groundstation.viewer.recorder import Recorder
-from groundstation.viewer.recording import answer_tabs, logged, save_stream, send_layout
+from groundstation.viewer.recording import answer_tabs, save_stream, send_tabs, with_log
 
 
 def write_session_recording(path: Path, assembled: AssembledSession, results: FlightResults, systems: Systems) -> None:
@@ -43,12 +44,13 @@ def write_session_recording(path: Path, assembled: AssembledSession, results: Fl
 def send_session(
     stream: rr.RecordingStream, assembled: AssembledSession, results: FlightResults, systems: Systems
 ) -> rrb.Blueprint:
-    """Log everything to a stream that has its sink and send the layout; returns the layout."""
-    recorder = Recorder(stream, assembled.start_ns, assembled.has_utc, systems)
+    """Log everything to a stream that has its sink with its layout first; returns the layout."""
+    held = HeldStream(stream)
+    recorder = Recorder(held.stream, assembled.start_ns, assembled.has_utc, systems)
     stream.send_recording_name(clean_text(results.flight_id))
     attempt("properties", "results", send_properties, stream, results)
     if assembled.has_utc:
         stream.send_recording_start_time_nanos(assembled.start_ns)
     clock = Flight({}, results.metadata, assembled.start_ns, assembled.has_utc)  # findings have places in time alone
     tabs = answer_tabs(SessionAnswer, recorder, results)
-    return send_layout(stream, logged(tabs, recorder, clock, results))
+    return send_tabs(stream, held, with_log(tabs, recorder, clock, results))

@@ -27,6 +27,7 @@ from groundstation.systems.latency.answer import Latencies, Latency
 from tests.figure_arrays import filled
 from tests.report_example import example, heading_result
 from tests.systems.inertial.example import forecast_result, inertial_result
+from tests.test_recorded import topic
 from tests.told import PLOTS, front, next_steps
 
 BARE = FlightResults("NOTIME_00000000", Source("a.csv", "00" * 32, 0, "flat-csv"), {}, None, 0.0, "failed")
@@ -381,6 +382,14 @@ def test_next_steps_are_at_most_three_lines_by_what_they_are_for() -> None:
         ("Check", "For the heading correction: the taxiway for reflections and gusts."),
     ]
     assert next_steps(example(heading_result(gates=()), not_assessable=())) is None
+
+
+@pytest.mark.parametrize(("field", "is_asked"), [("true_heading_deg", False), ("magnetic_heading_deg", True)])
+def test_a_log_without_a_compass_is_not_asked_for_a_magnetometer(field: str, is_asked: bool) -> None:
+    missing = (NotAssessable("magnetic", "no three-axis magnetometer in the log"),)
+    ledger = Ledger(topics={"ins": topic(10.0, 80.0, field)})
+    section = next_steps(example(heading_result(gates=()), ledger=ledger, not_assessable=missing))
+    assert ("magnetometer" in str(section)) == is_asked
 
 
 def test_provenance_names_log_and_files() -> None:

@@ -409,6 +409,39 @@ def test_the_tutorial_tells_what_the_verbs_print(tmp_path: Path, monkeypatch: py
     assert code == 4 and (line := out[out.index("warn") :].splitlines()[0]) and f"    {line}\n" in page
 
 
+def test_a_check_tells_every_field_of_a_column_and_the_inputs_of_derived_ones(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("t,place,hdg,var,depth\n0,47.2 8.5,7,3,1\n1,47.3 8.6,8,3,1\n", encoding="utf-8")
+    (tmp_path / "a.toml").write_text(
+        """name = "a"
+[time]
+kind = "seconds"
+column = "t"
+[columns]
+"place" = [{ field = "gnss.latitude_deg", unit = "deg", part = 1 },
+           { field = "gnss.longitude_deg", unit = "deg", part = 2 }]
+"hdg" = { field = "ins.magnetic_heading_deg", unit = "deg" }
+[[derived]]
+field = "ins.true_heading_deg"
+method = "true_from_magnetic"
+magnetic = "ins.magnetic_heading_deg"
+variation = { column = "var", unit = "deg" }
+""",
+        encoding="utf-8",
+    )
+    checked = try_profile(tmp_path / "a.toml", tmp_path / "a.csv")
+    assert [(one.name, one.became) for one in checked.columns] == [
+        ("t", "time"),
+        ("place", "gnss.latitude_deg"),
+        ("place", "gnss.longitude_deg"),
+        ("hdg", "ins.magnetic_heading_deg"),
+        ("var", "input of ins.true_heading_deg"),
+        ("depth", ""),
+    ]
+    assert sum(one.is_first for one in checked.columns) == 5
+    with pytest.raises(GroundstationError, match="profile list"):
+        registry.identify(tmp_path / "a.csv", Path("absent"))
+
+
 def bad_tables() -> Iterator[bytes]:
     rng = random.Random(7)
     rows = "".join(f"{t},{lat:.6f},{lon:.6f},{track:.1f}\n" for t, lat, lon, track in circle(40))

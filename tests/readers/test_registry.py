@@ -39,6 +39,13 @@ def test_known_formats_are_named(tmp_path: Path, content: bytes, name: str) -> N
     assert "not readable in this version" in text and "log.csv" in text
 
 
+@pytest.mark.parametrize("content", [b"PK\x03\x04", b"BZh9", b"\xfd7zXZ\0"], ids=["zip", "bzip2", "xz"])
+def test_an_archive_that_is_not_opened_is_to_be_unpacked(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "log.ulg").write_bytes(content + bytes(20))
+    text = refusal(tmp_path / "log.ulg")
+    assert "unpack it" in text and "flat CSV" not in text
+
+
 @pytest.mark.parametrize(
     ("content", "expected"),
     [

@@ -4,6 +4,7 @@ import pytest
 
 import groundstation
 from groundstation.chapters.front import front
+from groundstation.pipeline.one_flight.flight import sentence
 from groundstation.systems import systems
 from tests.real_logs import real_log
 
@@ -51,7 +52,9 @@ LONG = {"dataflash/TestLog2_REENCODED_plane.BIN", "foreign/robot_localization_hu
 @pytest.mark.parametrize("name", [pytest.param(one, marks=pytest.mark.slow) if one in LONG else one for one in OPENS])
 def test_a_recorded_log_opens_on_what_its_owner_asks(name: str) -> None:
     tone, word, headline, line = OPENS[name]
-    top = front(groundstation.open(real_log(name)).results, systems().chapters)
+    results = groundstation.open(real_log(name)).results
+    top = front(results, systems().chapters)
     assert top.verdict is not None and (top.verdict.tone, top.verdict.text) == (tone, word)
     assert headline.lower() in top.headline.lower() and line in top.recorded
     assert "No answer" not in top.line
+    assert word == "Recorded" or sentence(results).lower().startswith(f"{word.lower()}: "), sentence(results)

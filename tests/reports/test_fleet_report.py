@@ -19,6 +19,7 @@ from pypdf import PdfReader
 
 from groundstation.base.timescales import utc_ns_to_stamp
 from groundstation.chapters.fleet import flights
+from groundstation.chapters.plots.fleet.trend import charts
 from groundstation.methods.fleet import answer
 from groundstation.methods.fleet.changes import ChangeSettings
 from groundstation.methods.fleet.density import densities_of, histogram_of
@@ -28,6 +29,7 @@ from groundstation.methods.fleet.skill import SkillMerger
 from groundstation.methods.fleet.trends import trends
 from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS
 from groundstation.pipeline.many_flights.fleet.statistics import gather
+from groundstation.plots.marks import Limit
 from groundstation.reports.fleet_report import MOST_ROWS_ON_PAPER, PAGE, write_fleet_report
 from groundstation.results.arrays.fleet import FleetChecks, FleetSkillFlights
 from groundstation.results.figures import FigureData
@@ -153,6 +155,11 @@ def page_of(out: Path, fleet: FleetResults) -> Page:
     return Page((out / PAGE).read_text(encoding="utf-8"))
 
 
+def as_read(page: Page) -> str:
+    """The text of a page, no blank before a comma or a full stop."""
+    return re.sub(" +(?=[.,])", "", page.text)
+
+
 def page_and_paper_of(out: Path, fleet: FleetResults) -> tuple[Page, str]:
     written = write_fleet_report(out, fleet, systems(), with_pdf=True)
     assert not written.problem
@@ -201,7 +208,7 @@ def test_every_flight_has_a_row_with_its_figures(usual: FleetResults, html: str)
     assert errors == pytest.approx(usual.flights["error_deg"], abs=6e-4)
     assert [row[5] for row in rows] == ["0.060"] * 60
     assert sum(row[3] == "✗ reject" for row in rows) == int(np.sum(usual.flights["verdict"] == "reject")) > 0
-    assert "precision e 0.081° above 0.05°" in rows[9][10]
+    assert "rejected (reason 1)" in rows[9][10] and html.count("precision e 0.081° above 0.05°") == 1
 
 
 def test_the_page_holds_what_the_results_say(usual: FleetResults, html: str) -> None:
@@ -216,7 +223,7 @@ def test_the_page_holds_what_the_results_say(usual: FleetResults, html: str) -> 
     reference = usual.calibration[0]
     assert f"{reference.inside} of {reference.checks}" in text and "▲ too sure" in text
     at_60 = next(row for row in usual.skill if (row.method, row.horizon_min) == ("last_estimate", 60.0))
-    assert f"{at_60.rms_m:.0f}\u202fm" in html
+    assert f"RMS over {at_60.starts} starts" in text and tiles_of(usual)["Forecast, 60 min"][1].startswith("3 aircraft")
 
 
 def test_a_slope_is_told_on_top_with_its_date(tmp_path: Path) -> None:
@@ -251,7 +258,7 @@ def test_what_asks_for_a_look_is_on_the_first_screen(tmp_path: Path) -> None:
     )
     page = page_of(tmp_path, fleet)
     ids = fleet.flights["flight_id"].tolist()
-    first = page.text.split("Every flight of the fleet")[0]
+    first = as_read(page).split("Every flight of the fleet")[0]
     assert f"Rejected: {ids[0]}." in first and f"Approach not stabilised: {ids[0]}." in first
     assert f"Data lost: {ids[1]}." in first and f"Health failed: {ids[2]}." in first
     assert "1 rejected · 1 approach not stabilised · 1 flight with failed health · 1 flight with lost data" in first
@@ -262,6 +269,56 @@ def test_what_asks_for_a_look_is_on_the_first_screen(tmp_path: Path) -> None:
     assert "1 approach not stabilised (last: speed, sink rate)" in rows[0][14] and "vibration high" in rows[2][14]
     bare = fleet_of(3, ("A12",), samples=20, error_deg=[math.nan] * 3)
     assert "Error, °" not in [one.title for one in flights.heads_of(bare)]
+
+
+def tiles_of(fleet: FleetResults) -> dict[str, tuple[str, str]]:
+    """The key figures of all chapters: value and remark by label."""
+    every = (figure for chapter in systems().fleet_chapters for figure in chapter.figures(fleet))
+    return {label: (value.replace("\u202f", " "), remark) for label, value, remark in every}
+
+
+def test_tiles_never_average_aircraft() -> None:
+    rate = [1.0, 4.0] * 4
+    two = fleet_of(8, ("A12", "RA-1"), samples=20, radial_error_rate_fit_nmiph=rate)
+    shown, table = tiles_of(two), two.skill_flights
+    assert shown["INS drift"] == ("1.00 … 4.00 nmi/h", "medians of 2 aircraft, 8 unaided flights")
+    value, remark = shown["Forecast, 60 min"]
+    own = [
+        math.sqrt(np.mean(table.rms_m[(table.aircraft == name) & (table.horizon_min == 60.0)] ** 2))
+        for name in ("A12", "RA-1")
+    ]
+    assert value == f"{min(own):.0f} … {max(own):.0f} m" and remark.startswith("2 aircraft; RMS over")
+    shown = tiles_of(fleet_of(8, ("A12",), samples=20, radial_error_rate_fit_nmiph=rate))
+    assert shown["INS drift"] == ("2.50 nmi/h", "median of 8 unaided flights")
+    assert "…" not in shown["Forecast, 60 min"][0]
+
+
+def test_a_reason_is_told_once_with_its_flights(tmp_path: Path) -> None:
+    why = [f"GNSS shows {speed} m/s at standstill, at most 0.01 m/s" for speed in (0.04, 0.05)]
+    fleet = fleet_of(
+        6, ("A12",), samples=20, verdict=["reject"] * 5 + ["accept"], verdict_reason=why * 2 + ["short", ""]
+    )
+    text, ids = as_read(page_of(tmp_path, fleet)), fleet.flights["flight_id"].tolist()
+    assert text.count("at standstill, at most") == 1 and f"4 flights: {', '.join(ids[:4])}" in text
+    remarks = flights.remarks_of(fleet)
+    assert [remarks[one][0].text for one in ids[:5]] == ["rejected (reason 1)"] * 4 + ["rejected: short"]
+    assert f'<span class="id">{ids[0]}</span>' in (tmp_path / PAGE).read_text(encoding="utf-8"), "kept on a line"
+
+
+def test_charts_of_health_have_the_limit_of_the_check(tmp_path: Path) -> None:
+    hdop = (0.8 + 0.01 * np.arange(12)).tolist()
+    fleet = fleet_of(12, ("A12",), samples=20, health_hdop=hdop, health_hdop_limit=[2.0] * 12)
+    drawn = charts(fleet, "health_hdop")
+    assert drawn is not None and "Dotted red" in drawn.caption
+    marks = drawn.rows[0].panels[0].marks
+    assert [mark.value for mark in marks if isinstance(mark, Limit) and not mark.is_upright] == [2.0]
+    assert {one.limit for one in fleet.slopes if one.quantity == "health_hdop"} == {2.0}
+    far = charts(fleet_of(12, ("A12",), samples=20, health_hdop=hdop, health_hdop_limit=[20.0] * 12), "health_hdop")
+    bare = charts(fleet_of(12, ("A12",), samples=20, health_hdop=hdop), "health_hdop")
+    for other in (far, bare):
+        assert other is not None
+        assert not [one for one in other.rows[0].panels[0].marks if isinstance(one, Limit) and not one.is_upright]
+    assert bare is not None and "Dotted red" not in bare.caption
 
 
 def test_only_the_script_of_the_report_may_run(html: str) -> None:

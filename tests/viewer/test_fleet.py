@@ -19,6 +19,7 @@ from groundstation.results.fleet import Densities, FleetResults, NotInFleet
 from groundstation.systems.cooperative.fleet_chapter import build as sessions
 from groundstation.systems.heading import fleet_chapter as aircraft
 from groundstation.systems.inertial import fleet_chapter as forecast
+from groundstation.viewer.file_contents import facts_of_file
 from groundstation.viewer.fleet_density import MOST_STEPS, PATH, steps
 from tests.fleet_example import save_flight, skill
 from tests.recording_contents import Contents
@@ -257,6 +258,9 @@ def test_one_flight_and_none(tmp_path: Path) -> None:
     assert ends[0] < ends[1], "a band of one flight is not seen"
 
 
+FIGURES = ("error_deg", "radial_error_rate_fit_nmiph")
+
+
 def test_flights_without_any_heading_leave_the_charts_out(fleet: FleetResults, tmp_path: Path) -> None:
     unknown = np.full(FLIGHTS, np.nan)
     bare = changed(fleet, error_deg=unknown, radial_error_rate_fit_nmiph=unknown, verdict=np.full(FLIGHTS, ""))
@@ -267,8 +271,18 @@ def test_flights_without_any_heading_leave_the_charts_out(fleet: FleetResults, t
     )
     found = Contents(tmp_path / "fleet.rrd")
     assert not [entity for entity in found.batches if "heading_error" in entity or "radial" in entity]
-    states = found.batches[f"/aircraft/{STEADY}/verdict"][0].column("StateChange:state").to_pylist()
-    assert states == [["not assessed"]] * (FLIGHTS // 3)
+    assert not [entity for entity in found.batches if entity.startswith("/aircraft/")]
+    assert facts_of_file(tmp_path / "fleet.rrd")["tabs"] == "Fleet, Forecast, Flights, Failed", "no aircraft has a page"
+
+
+def test_aircraft_that_no_flight_judged_have_no_page(fleet: FleetResults, tmp_path: Path) -> None:
+    is_other = fleet.flights["aircraft"] != STEADY
+    errors, rates = (np.where(is_other, np.nan, fleet.flights[name]) for name in FIGURES)
+    verdicts = np.where(is_other, "", fleet.flights["verdict"])
+    mixed = changed(fleet, **dict(zip(FIGURES, (errors, rates), strict=True)), verdict=verdicts)
+    write_fleet_recording(tmp_path / "fleet.rrd", replace(mixed, trend=fleet.trend.where(slice(0)), change_points=()))
+    found = Contents(tmp_path / "fleet.rrd")
+    assert {entity.split("/")[2] for entity in found.batches if entity.startswith("/aircraft/")} == {STEADY}
 
 
 def test_the_newest_verdict_of_every_aircraft_has_room_behind_it(contents: Contents) -> None:

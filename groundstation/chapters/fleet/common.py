@@ -34,7 +34,7 @@ def title_of(quantity: str) -> str:
 def figure_of(quantity: str, value: float | None) -> str:
     """Return a value of a quantity with its unit; angles carry their sign, but for RMS."""
     _, unit, places = QUANTITIES.get(quantity, (*named_quantity(quantity), 3))
-    return bounded(value, places, unit, signed=unit in "°′" and not quantity.endswith("_rms_deg"))
+    return bounded(value, places, unit, signed=unit in ("°", "′") and not quantity.endswith("_rms_deg"))
 
 
 def bounded(value: float | None, places: int, unit: str = "", *, signed: bool = False) -> str:

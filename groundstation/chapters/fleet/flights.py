@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.chapters.fleet.common import aircraft_name, bounded, minute, plural, title_of
+from groundstation.chapters.fleet.reasons import reasons_of
 from groundstation.chapters.gates import VERDICTS
-from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Section, Tone
-from groundstation.chapters.wording import ABSENT, clean, clock, number, typeset
+from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Section, Tone, kept
+from groundstation.chapters.wording import ABSENT, clean, clock, number
 from groundstation.results.fleet import FleetResults
 
 KEY = "flights"
@@ -58,7 +59,7 @@ def by_number(fleet: FleetResults, rows: NDArray[np.intp], numbers: NDArray[np.i
     some = f" The last {number(len(cells), 0)}; all of them are in flights.parquet." if len(cells) < len(fleet) else ""
     heads = heads_of(fleet)
     grid = Grid("", (heads[0], Head("No.", True), *heads[1:]), cells, f"{CAPTION}{some}")
-    return Section(KEY, plural(len(fleet), "flight"), LEAD, (grid,) if cells else ())
+    return Section(KEY, plural(len(fleet), "flight"), LEAD, kept((grid, reasons_of(fleet).table)) if cells else ())
 
 
 def _lines(fleet: FleetResults, rows: NDArray[np.intp], noted: Mapping[str, Sequence[Mark]]) -> list[FlightLine]:
@@ -197,10 +198,8 @@ def remarks_of(fleet: FleetResults) -> dict[str, list[Mark]]:
         )
     for row in np.flatnonzero(flights["status"] == "failed"):
         note(flights["flight_id"][row], "bad", "failed")
-    for row in np.flatnonzero(flights["verdict"] == "reject"):
-        note(
-            flights["flight_id"][row], "bad", f"rejected: {typeset(str(flights['verdict_reason'][row])) or 'no reason'}"
-        )
+    for flight_id, text in reasons_of(fleet).remarks.items():
+        note(flight_id, "bad", text)
     for outlier in fleet.outliers:
         note(outlier.flight_id, "warn", f"outlier: {title_of(outlier.quantity)}")
     for row in np.flatnonzero(trend.is_outside) if len(trend) else ():
@@ -211,8 +210,6 @@ def remarks_of(fleet: FleetResults) -> dict[str, list[Mark]]:
         count = plural(int(flights["landing_unstable_approaches"][row]), "approach", "approaches")
         criteria = ", ".join(clean(str(flights["landing_criteria_not_met"][row])).split()[:4]).replace("_", " ")
         note(flights["flight_id"][row], "warn", f"{count} not stabilised{f' (last: {criteria})' if criteria else ''}")
-    for row in np.flatnonzero(flights["health_verdict"] == "fail"):
-        note(flights["flight_id"][row], "warn", clean(str(flights["health_sentence"][row])) or "health failed")
     for row in np.flatnonzero(flights["findings_fail"] > 0):
         note(flights["flight_id"][row], "warn", plural(int(flights["findings_fail"][row]), "severe finding"))
     for row in np.flatnonzero(flights["has_lost_data"]):
@@ -234,7 +231,7 @@ def build(fleet: FleetResults) -> Section:
         f"Notable flights first, {number(noted, 0)} of {plural(len(fleet), 'flight')}: failed, rejected, outliers, "
         "outside the limits, the first of a new level, or with severe findings."
     )
-    return Section(KEY, "Flights", LEAD, (Grid("Flights", heads, rows, caption),))
+    return Section(KEY, "Flights", LEAD, kept((Grid("Flights", heads, rows, caption), reasons_of(fleet).table)))
 
 
 def _gravity(line: FlightLine) -> int:

@@ -125,7 +125,7 @@ def _changes(fleet: FleetResults) -> list[str]:
         for one in fleet.change_points[:MOST_CHANGES]
     ]
     more, sloping = len(fleet.change_points) - len(told), slopes.sloping(fleet)
-    told += [slopes.sentence_of(one) for one in sloping[:MOST_CHANGES]]
+    told += [slopes.sentence_of(one, fleet) for one in sloping[:MOST_CHANGES]]
     more += len(sloping[MOST_CHANGES:])
     return [*told, f"{plural(more, 'change')} more in the chapter on the trend."] if more else told
 

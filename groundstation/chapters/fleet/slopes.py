@@ -9,10 +9,10 @@ from groundstation.results.fleet import FleetResults
 from groundstation.results.fleet_trends import SlopeRow
 
 CAPTION = (
-    "Flights since the last change of level, six or more. Slope: median over all pairs of flights; in brackets 95 %, "
-    "from the scatter of the flights. Level now: the line at the last flight. A slope is called where the flights "
-    "show a change that a line explains as well as a step does. Limits: --unit-limits; of the test ratio 1. The date "
-    "continues the line."
+    "Flights since the last change of level, or all, six or more. Slope: median over all pairs of flights; in "
+    "brackets 95 %, from the scatter of the flights. Level now: the line at the last flight. A slope is called where "
+    "the flights show a change that a line explains as well as a step does. Limits: --unit-limits; of vibration and "
+    "HDOP that from which the check warns; of the test ratio 1. The date continues the line."
 )
 
 
@@ -21,16 +21,23 @@ def sloping(fleet: FleetResults) -> list[SlopeRow]:
     return [one for one in fleet.slopes if one.is_slope]
 
 
-def sentence_of(one: SlopeRow) -> str:
+def sentence_of(one: SlopeRow, fleet: FleetResults) -> str:
     """Return a slope as a sentence: how fast, how sure, since when, when it reaches its limit."""
     slope, low, high = (_slope(one, value) for value in one.per_flight)
     told = (
         f"{aircraft_name(one.aircraft)}: {title_of(one.quantity)} {_verb(one)} by {slope} a flight (95 % {low} … "
-        f"{high}) over {number(one.flights, 0)} flights since {_date(one.since_utc_ns)}, now "
+        f"{high}) over {number(one.flights, 0)} flights since {_since(one, fleet)}, now "
         f"{figure_of(one.quantity, one.level)}"
     )
     due = _due(one)
     return f"{told}; {due}." if due else f"{told}."
+
+
+def _since(one: SlopeRow, fleet: FleetResults) -> str:
+    """Return the day from which on a line runs, and whether a step is there."""
+    changes = ((change.aircraft, change.quantity, change.start_utc_ns) for change in fleet.change_points)
+    step = "the last step, " if (one.aircraft, one.quantity, one.since_utc_ns) in changes else ""
+    return f"{step}{_date(one.since_utc_ns)}"
 
 
 def grid(fleet: FleetResults) -> Grid | None:
@@ -42,20 +49,21 @@ def grid(fleet: FleetResults) -> Grid | None:
         *(Head("Level now", True), Head("State"), Head("Limit", True), Head("Reached on")),
     )
     order = sorted(fleet.slopes, key=lambda one: not one.is_slope)
-    return Grid("Slopes", heads, [_row(one) for one in order], CAPTION)
+    return Grid("Slopes since the last step", heads, [_row(one) for one in order], CAPTION)
 
 
 def _row(one: SlopeRow) -> tuple[Cell, ...]:
-    slope, low, high = (_slope(one, value) for value in one.per_flight)
-    level, least, most = (figure_of(one.quantity, value) for value in (one.level, one.level_low, one.level_high))
+    title, unit, places = QUANTITIES[one.quantity]
+    slope, low, high = (_slope(one, value, has_unit=False) for value in one.per_flight)
+    level, least, most = (bounded(value, places) for value in (one.level, one.level_low, one.level_high))
     state: Cell = Mark("bad", "beyond") if one.is_over else Mark("warn", _verb(one)) if one.is_slope else "no slope"
     due = ABSENT
     if one.due_utc_ns is not None:
         due = f"{_date(one.due_utc_ns)} ({_date(one.due_earliest_utc_ns)} … {_end(one)})"
     return (
-        *(aircraft_name(one.aircraft), title_of(one.quantity), number(one.flights, 0)),
+        *(aircraft_name(one.aircraft), f"{title}, {unit}" if unit else title, number(one.flights, 0)),
         *(f"{slope} ({low} … {high})", f"{level} ({least} … {most})", state),
-        *(ABSENT if one.limit is None else _limit(one), due),
+        *(ABSENT if one.limit is None else bounded(one.limit, places), due),
     )
 
 
@@ -67,10 +75,10 @@ def _end(one: SlopeRow) -> str:
     return "no sure end" if one.due_latest_utc_ns is None else _date(one.due_latest_utc_ns)
 
 
-def _slope(one: SlopeRow, value: float) -> str:
+def _slope(one: SlopeRow, value: float, *, has_unit: bool = True) -> str:
     """Return a slope in the unit of its quantity, with a decimal more."""
     _, unit, places = QUANTITIES[one.quantity]
-    return bounded(value, max(places + 1, 3), unit, signed=True)
+    return bounded(value, max(places + 1, 3), unit if has_unit else "", signed=True)
 
 
 def _verb(one: SlopeRow) -> str:

@@ -11,7 +11,7 @@ from groundstation.chapters.fleet.common import (
     title_of,
 )
 from groundstation.chapters.parts import Cell, Figure, Grid, Head, Note, Part, Section
-from groundstation.chapters.wording import number, significant
+from groundstation.chapters.wording import ABSENT, number, significant
 from groundstation.results.fleet import FleetResults
 from groundstation.results.fleet_trends import ChangePoint
 
@@ -81,22 +81,27 @@ def changes_of(fleet: FleetResults, quantity: str, name: str) -> list[tuple[int,
 
 
 def _levels(fleet: FleetResults, quantity: str) -> Grid | None:
-    heads = (
+    heads = [
         *(Head("Aircraft"), Head("Flights", True), Head("From"), Head("To"), Head("Level now", True)),
-        *(Head("Low limit", True), Head("High limit", True), Head("Outside", True), Head("Changes", True)),
-    )
+        *(Head("Control limits", True), Head("Outside", True), Head("Changes", True)),
+    ]
+    limits = fleet.trend.limit[fleet.trend.quantity == quantity]
+    has_limit = bool(np.isfinite(limits).any())
+    heads += [Head("Limit", True)] if has_limit else []
     rows: list[tuple[Cell, ...]] = []
     for name in charted(fleet, quantity):
         own = flights_of(fleet, quantity, name)
         last = fleet.trend.where(own[-1:])
-        now = {"level": float(last.level[0]), "low": float(last.low[0]), "high": float(last.high[0])}
+        level, low, high, limit = (float(values[0]) for values in (last.level, last.low, last.high, last.limit))
         rows.append(
             (
                 *(aircraft_name(name), number(len(own), 0)),
                 *(day(fleet.trend.start_utc[row]) for row in (own[0], own[-1])),
-                *(figure_of(quantity, value) for value in now.values()),
+                figure_of(quantity, level),
+                f"{figure_of(quantity, low)} … {figure_of(quantity, high)}",
                 number(int(fleet.trend.is_outside[own].sum()), 0),
                 number(len(changes_of(fleet, quantity, name)), 0),
+                *((figure_of(quantity, limit).lstrip("+") if np.isfinite(limit) else ABSENT,) if has_limit else ()),
             )
         )
     return Grid(f"Levels of the {title_of(quantity)}", heads, rows) if rows else None

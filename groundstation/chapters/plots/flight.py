@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from groundstation.base.ellipse import ELLIPSE_95, outlines
+from groundstation.base.ellipse import ELLIPSE_95, outlines, told_ellipses
 from groundstation.base.geodesy import is_near_pole, on_earth, plan_north_east_m
 from groundstation.chapters.plots.coast import coast
 from groundstation.chapters.plots.common import lane_roles, span
@@ -52,10 +52,11 @@ def track_map(results: FlightResults) -> Plot | None:
     on_ground = _extent(north[taxi], east[taxi])
     zoom = on_ground > SMALLEST_TAXI_M and _extent(north, east) > 2.0 * on_ground
     corrected = corrected_position(results)
-    larger = 1 if corrected is None else corrected.larger(_extent(north, east))
-    scale = _scale(north, east)[0]
-    behind = () if corrected is None else (_ellipses(corrected, origin, larger, scale),)
-    whole = _map(time, north, east, used, "Whole flight" if zoom else "", behind)
+    ellipses: tuple[Outlines, ...] = ()
+    of_ellipses = ""
+    if corrected is not None:
+        ellipses, of_ellipses = _ellipses(corrected, origin, _extent(north, east), _scale(north, east)[0])
+    whole = _map(time, north, east, used, "Whole flight" if zoom else "", ellipses)
     is_polar = is_near_pole(latitude)
     whole, of_shore = _shore(whole, HALF_ASPECTS if zoom else ASPECTS, origin, is_polar=is_polar)
     panels = [whole]
@@ -64,10 +65,7 @@ def track_map(results: FlightResults) -> Plot | None:
     caption = f"Ring: start ({number(origin[0], 5, '°')}, {number(origin[1], 5, '°')})."
     if answer is not None and used.any():
         caption += f" Green: straight taxi used for {answer.taxi_serves}."
-    if corrected is not None:
-        size = f", drawn {number(larger, 0)} times their size" if larger > 1 else ""
-        caption += f" Ellipses: 95 % of the corrected position{size}."
-    caption += of_shore
+    caption += of_ellipses + of_shore
     if is_polar or _extent(north, east) > LARGEST_OF_ONE_SCALE_M:
         caption += " Scale and north are those at the start."
     alt = "Map of the track in metres north and east of the start."
@@ -101,14 +99,18 @@ def _scale(north: Floats, east: Floats) -> tuple[float, str]:
     return (1e-3, "km") if _extent(north, east) > LARGEST_IN_METRES else (1.0, "m")
 
 
-def _ellipses(corrected: CorrectedPosition, origin: tuple[float, float], larger: int, scale: float) -> Outlines:
-    """Return 95 % ellipses of the corrected position along the track."""
-    rows = corrected.along()
+def _ellipses(
+    corrected: CorrectedPosition, origin: tuple[float, float], side_m: float, scale: float
+) -> tuple[tuple[Outlines, ...], str]:
+    """Return 95 % ellipses of the corrected position along the track, and their caption."""
+    rows, larger = corrected.drawn_on(side_m)
     north, east = plan_north_east_m(corrected.latitude_deg[rows], corrected.longitude_deg[rows], *origin)
     sigmas = corrected.sigma_north_m[rows], corrected.sigma_east_m[rows]
     middles = np.column_stack([north, east])[:, None, :]
     drawn = scale * (middles + larger * outlines(*sigmas, np.zeros(len(rows)), ELLIPSE_95))
-    return Outlines(rings=tuple(one[:, ::-1] for one in drawn), magnified=larger, role="ins", emphasis="thin")
+    rings = tuple(one[:, ::-1] for one in drawn)
+    words = told_ellipses("Ellipses: 95 % of the corrected position", larger, len(corrected.along()) - len(rows))
+    return (Outlines(rings=rings, magnified=larger, role="ins", emphasis="thin", makes_room=False),), f" {words}"
 
 
 def _map(time: Floats, north: Floats, east: Floats, used: Flags, title: str, behind: tuple[AnyMark, ...] = ()) -> Panel:

@@ -29,6 +29,10 @@ FloatArray = NDArray[np.float64]
 FALSE_STEPS = 0.05
 MOST_ORDERS = 2_000_000  # flights in all drawn orders of one series
 TEST_RATIO_LIMIT = 1.0  # the on-board filter refuses a measurement beyond it
+LIMIT_COLUMNS: Mapping[TrendQuantity, str] = {  # where the answers of the flights say from when a check warns
+    "health_vibration_mps2": "health_vibration_limit_mps2",
+    "health_hdop": "health_hdop_limit",
+}
 
 # Figures that are positive and skewed are judged by their logarithm.
 OF_AUTOPILOTS: tuple[TrendQuantity, ...] = (
@@ -102,6 +106,7 @@ def trends(flights: FigureData, settings: ChangeSettings, limits: UnitLimits | N
             chart = control_chart(value - curve, settings=settings, changes=series.changes)
             if chart is None:
                 continue
+            limit = stated.get(quantity, _limit_of_check(flights, quantity, timed))
             own = FleetTrend(
                 aircraft=np.full(len(timed), name),
                 quantity=np.full(len(timed), quantity),
@@ -112,10 +117,11 @@ def trends(flights: FigureData, settings: ChangeSettings, limits: UnitLimits | N
                 low=unscaled(quantity, chart.low + curve),
                 high=unscaled(quantity, chart.high + curve),
                 is_outside=chart.is_outside(value - curve),
+                limit=np.full(len(timed), np.nan if limit is None else limit),
             )
             charted.append(own)
             changes += _change_points(name, quantity, own, chart)
-            found = _slope(name, quantity, day, own, series, stated.get(quantity))
+            found = _slope(name, quantity, day, own, series, limit)
             slopes += [] if found is None else [found]
     return FleetTrends(joined(charted), tuple(changes), tuple(slopes))
 
@@ -128,6 +134,14 @@ def _limits(limits: UnitLimits) -> dict[TrendQuantity, float]:
         "health_test_ratio": TEST_RATIO_LIMIT,
     }
     return {name: limit for name, limit in stated.items() if limit is not None}
+
+
+def _limit_of_check(flights: FigureData, quantity: TrendQuantity, rows: NDArray[np.intp]) -> float | None:
+    """Return the value from which the check of a quantity warns, by the last flight with one."""
+    name = LIMIT_COLUMNS.get(quantity)
+    values = flights[name][rows] if name is not None else np.zeros(0)
+    known = values[np.isfinite(values)]
+    return float(known[-1]) if len(known) else None
 
 
 def _series(

@@ -72,11 +72,21 @@ def is_session(folder: Path) -> bool:
     return any((folder / mark).is_file() for mark in SESSION_MARKS)
 
 
-def no_log(folder: Path) -> UsageError:
-    """Error for a folder that is not the log that a verb takes."""
+def no_log(folder: Path, *, takes_flights: bool = False) -> UsageError:
+    """Error for a folder that is not the log that a verb takes; some verbs take the folder of a flight too."""
     if is_session(folder):
         return UsageError(str(folder), "a session of several aircraft", "a log", "manifest.json in it names its logs")
-    return UsageError(str(folder), "a folder", "a log", "`run` takes folders")
+    expected = "a log or the folder of one flight" if takes_flights else "a log"
+    if (folder / FLIGHT_FOLDER_MARK).is_file():
+        return UsageError(str(folder), "the folder of a flight", expected, "name the .mcap in it")
+    try:
+        has_flights = any((one / FLIGHT_FOLDER_MARK).is_file() for one in folder.iterdir())
+    except OSError:
+        has_flights = False
+    if has_flights:
+        next_step = "name a flight in it" if takes_flights else "name the .mcap of a flight in it"
+        return UsageError(str(folder), "a folder of flights", expected, next_step)
+    return UsageError(str(folder), "a folder", expected, "`run` takes folders")
 
 
 def file_in(folder: Path, ending: str, *others: str) -> Path:

@@ -4,6 +4,8 @@ The user may leave out or force intervals. The analyses are imported when their 
 gives any: a log is converted without.
 """
 
+import hashlib
+import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -117,6 +119,24 @@ NO_REFERENCES = References()
 
 
 @dataclass(frozen=True)
+class SavedLayout:
+    """Layout saved in the viewer, which recordings get in place of their own: name of its file, and packed content."""
+
+    name: str
+    packed: bytes = field(repr=False)
+
+    @property
+    def content(self) -> bytes:
+        """Content of its file."""
+        return zlib.decompress(self.packed)
+
+    @property
+    def sha256(self) -> str:
+        """Digest of the content."""
+        return hashlib.sha256(self.content).hexdigest()
+
+
+@dataclass(frozen=True)
 class Configuration:
     """All settings of a user for a run.
 
@@ -144,6 +164,8 @@ class Configuration:
         What earlier flights say of installations, from an installations.json.
     without : tuple of str
         Analyses that are left out.
+    layout : SavedLayout, optional
+        What the recording of each flight shows in place of the default tabs.
 
     Raises
     ------
@@ -162,6 +184,7 @@ class Configuration:
     weather: tuple[str, ...] = ()
     lessons: "tuple[Lesson, ...] | None" = None
     without: tuple[str, ...] = ()
+    layout: SavedLayout | None = None
 
     def __post_init__(self) -> None:
         self.thresholds  # noqa: B018 -- raises now if a value is wrong
@@ -235,6 +258,8 @@ class Configuration:
             document["weather"] = list(self.weather)
         if self.without:
             document["without"] = list(self.without)
+        if self.layout:
+            document["layout"] = self.layout.name
         if self.references.paths:
             document["references"] = [path.name for path in self.references.paths]
         return document
@@ -336,6 +361,23 @@ def installed_as(configuration: Configuration, installation: Path | None) -> Con
     from groundstation.results.installations import read_installations
 
     return replace(configuration, lessons=read_installations(installation).lessons)
+
+
+def laid_out(configuration: Configuration, layout: Path | None) -> Configuration:
+    """Return the configuration with a layout for the recordings of flights.
+
+    Unchanged without a file.
+
+    Raises
+    ------
+    UsageError
+        When it is no layout that this version's viewer saved.
+    """
+    if layout is None:
+        return configuration
+    from groundstation.viewer.saved_layout import read_layout
+
+    return replace(configuration, layout=SavedLayout(layout.name, zlib.compress(read_layout(layout))))
 
 
 def applying(configuration: Configuration, apply: str) -> Configuration:

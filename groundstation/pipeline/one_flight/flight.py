@@ -15,12 +15,12 @@ from groundstation.base.failures import attempt, failures, gathered_failures, is
 from groundstation.base.findings import SEVERITIES, Finding, worst
 from groundstation.base.records import RecordBatch
 from groundstation.base.to_disk import sync_folder
-from groundstation.chapters.by_answer import dangers
 from groundstation.pipeline.one_flight.analyse import Given, analyse
 from groundstation.pipeline.one_flight.apply import apply_step, corrected_name, write_derived
 from groundstation.pipeline.one_flight.convert import Converted, convert_flight, parts_told
 from groundstation.pipeline.one_flight.identity import flight_id, sha256_of
 from groundstation.pipeline.one_flight.job import Job as Job
+from groundstation.pipeline.one_flight.line import line_of_results
 from groundstation.pipeline.one_flight.log import Log, digest_of, open_parts
 from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
@@ -33,7 +33,6 @@ from groundstation.reports.flight_report import PDF, REPORT, add_pdf, write_flig
 from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
 from groundstation.results.flight import FlightResults
 from groundstation.results.manifest import PartOfRun, PowerUpOfRun, Resume
-from groundstation.results.recorded import recorded
 from groundstation.systems import systems
 from groundstation.tables.table import Flight
 
@@ -250,7 +249,8 @@ def _show(partial: Path, flight: Flight, results: FlightResults, job: Job, watch
         from groundstation.viewer.recording import write_recording
 
         path = partial / f"{results.flight_id}.rrd"
-        attempt("recording", "flight", write_recording, path, flight, results, systems(), unless=OF_THE_WORLD)
+        layout = b"" if job.configuration.layout is None else job.configuration.layout.content
+        attempt("recording", "flight", write_recording, path, flight, results, systems(), layout, unless=OF_THE_WORLD)
     with watch.stage("reporting"):
         return write_flight_report(partial, systems(), with_pdf=job.with_pdf).problem
 
@@ -350,18 +350,8 @@ def state_of(findings: tuple[Finding, ...], has_lost_data: bool, fail_on: str) -
 
 
 def sentence(results: FlightResults) -> str:
-    """Return the results of a flight in one line, dangers first."""
-    every = systems()
-    told = ((one.name, attempt("line", one.name, one.sentence, results.answers)) for one in every.analyses)
-    found = [(name, text) for name, text in told if text]
-    if found:
-        ahead = dangers(results, every.chapters) if len(found) > 1 else frozenset()
-        return "; ".join(text for _name, text in sorted(found, key=lambda one: one[0] not in ahead))
-    if not results.not_assessable:
-        return recorded(results)
-    first, *others = results.not_assessable
-    more = f" and {len(others)} more" if others else ""
-    return f"{recorded(results)}; not assessable: {first.analysis} ({first.reason}){more}"
+    """Return the results of a flight in one line, the answer first that its page opens with."""
+    return line_of_results(results, systems())
 
 
 def is_made(name: str, identity: str) -> bool:

@@ -123,7 +123,9 @@ def clip(
         with gathered_failures():
             _record(target, done, settings)
             found = failures()
-    text = f"-> {target} ({_told(done.info)}, {target.stat().st_size / 1e6:.2f} MB)"
+    recording = target.with_suffix(".rrd")
+    sizes = [_size(target), *([f"recording {_size(recording)}"] if with_recording and recording.is_file() else [])]
+    text = f"-> {target} ({', '.join((_told(done.info), *sizes))})"
     listen(Event("end", path.name, text))
     state: State = "incomplete" if found else "data_lost" if done.has_lost_data else "done"
     return Outcome(str(path), state, text, folder=str(target), failures=found)
@@ -381,4 +383,13 @@ def _told(info: "StoreInfo") -> str:
     ends = [info.metadata.get(key) for key in ("clip.from_s", "clip.to_s")]
     start, end = (f"{float(text):.3f} s" if text else word for text, word in zip(ends, ("start", "end"), strict=True))
     origin = info.metadata.get(CUT_FROM, "a flight made anonymous")
-    return f"{rows} records of {len(topics)} topics, {start} to {end} of {origin}"
+    return f"{rows} records of {len(topics)} topics, {start} to {end} of {origin}, {_length(info)}"
+
+
+def _length(info: "StoreInfo") -> str:
+    """Return how long a part is, by the topic that lasts longest."""
+    return f"{max((topic.span_s for topic in info.ledger.topics.values()), default=0.0):.1f} s long"
+
+
+def _size(file: Path) -> str:
+    return f"{file.stat().st_size / 1e6:.2f} MB"

@@ -13,6 +13,7 @@ from groundstation.base.signals import BUS_PREFIX
 from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.log import Log, as_log, open_log
 from groundstation.pipeline.one_flight.segments import PowerUpTold, segments_in, segments_of, told_of
+from groundstation.pipeline.verbs.recordings import facts_of_recording, is_of_rerun
 from groundstation.store.info import StoreInfo
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ class Description:
 
 
 def describe(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()) -> Description:
-    """Describe a recorded log or a groundstation MCAP; ``icds`` name the words of its buses.
+    """Describe a recorded log, a groundstation MCAP or a recording; ``icds`` name the words of its buses.
 
     Raises
     ------
@@ -84,6 +85,8 @@ def describe(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()
     path = as_log(path)
     if path.is_dir():
         raise no_log(path)
+    if is_of_rerun(path):
+        return Description(facts_of_recording(path), (), (), False)
     log = open_log(path, profile, icds)
     return _stored(log) if log.is_store else _recorded(log)
 

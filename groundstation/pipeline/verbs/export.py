@@ -131,7 +131,7 @@ def saved_flight(folder: Path) -> "SavedFlight":
     from groundstation.systems import systems
 
     if not (folder / FLIGHT_FOLDER_MARK).is_file():
-        raise no_log(folder)
+        raise no_log(folder, takes_flights=True)
     return load(folder, systems().answer_types)
 
 

@@ -2,20 +2,20 @@
 
 import os
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
-from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
+from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.pipeline.many_flights.fleet.publishing import FLEET_RECORDING
 from groundstation.pipeline.many_flights.inputs import COMPARISON_RECORDING, file_in, is_remote
-from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.configuration import Configuration, SavedLayout, laid_out
 from groundstation.pipeline.one_flight.flight import Job, run_flight
 from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.pipeline.verbs.recordings import is_of_rerun, sound
 from groundstation.results.files import load_manifest
 
 ADDRESSES = ("rerun://", "rerun+http://", "rerun+https://")
-MOST_VERIFIED_BYTES = 200_000_000  # 25 MB take 0.65 s of one core
-MAGIC = b"RRF"  # with a digit of the version, at the beginning of every recording
 
 
 def look_at(
@@ -26,6 +26,7 @@ def look_at(
     port: int | None,
     power_up: int = 1,
     profile: Path | None,
+    layout: Path | None = None,
     say: Callable[[str], None],
 ) -> None:
     """Open a flight in the Rerun viewer; an MCAP or log is run into a temporary folder first.
@@ -41,11 +42,13 @@ def look_at(
         Where the viewer listens; see :func:`groundstation.viewer.launch.open_viewer`.
     power_up : int
         Which of several power-ups in an MCAP or log, from 1.
+    layout : Path, optional
+        Layout saved in the viewer, which it opens with.
 
     Raises
     ------
     UsageError
-        When the path is missing or a folder without a recording.
+        When the path is missing or a folder without a recording, or the layout is none.
     GroundstationError
         When the log cannot be run, the file is no recording or a damaged one, or the viewer does not start.
     """
@@ -55,16 +58,20 @@ def look_at(
     is_address = what.startswith(ADDRESSES)
     if not is_address and not path.exists():
         raise UsageError(what, "no such file or folder")
+    if is_address and layout is not None:
+        raise UsageError("--layout", "the address of a catalog", "a recording, flight folder, MCAP or log")
+    configuration = laid_out(Configuration(profile=str(profile) if profile else None), layout)
     if not web:
         require_display(os.environ)  # before anything is computed
     if is_address:
         code = open_viewer(what, web=web, host=host, port=port)
     elif path.is_dir() or path.suffix == ".rrd":
-        code = open_viewer(_sound(_recording(path)), web=web, host=host, port=port, say=say)
+        recording = sound(_recording(path))
+        with _laid_out(recording, configuration.layout) as shown:
+            code = open_viewer(shown, web=web, host=host, port=port, links=recording.parent, say=say)
     else:
         with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
             say(f"computing {path.name} ...")
-            configuration = Configuration(profile=str(profile) if profile else None)
             outcome = run_flight(Job(path, Path(folder), configuration, power_up=power_up))
             if outcome.state == "failed":
                 where, _, found = outcome.text.partition(": ")
@@ -103,22 +110,23 @@ def open_results(out: str, outcomes: Sequence[Outcome], *, say: Callable[[str], 
         look_at(place, web=False, host="127.0.0.1", port=None, profile=None, say=say)
 
 
-def _sound(recording: Path) -> Path:
-    """Return a recording that Rerun can read from end to end.
-
-    A damaged one may end the viewer without a word.
-    """
-    from groundstation.viewer.verification import damaged
-
-    if recording.stat().st_size <= MOST_VERIFIED_BYTES and (fault := damaged([recording])):
-        raise GroundstationError(str(recording), f"damaged: {fault[recording]}", next_step="run the log again")
-    return recording
-
-
 def _recording(path: Path) -> Path:
     """Return a recording, or that in a folder of a flight, of all flights, of a comparison."""
     recording = file_in(path, ".rrd", FLEET_RECORDING, COMPARISON_RECORDING) if path.is_dir() else path
-    with told_in_a_line(str(recording)), recording.open("rb") as file:
-        if file.read(len(MAGIC)) != MAGIC:
-            raise GroundstationError(str(recording), "no Rerun recording", next_step="run the log again")
+    if not is_of_rerun(recording):
+        raise GroundstationError(str(recording), "no Rerun recording", next_step="run the log again")
     return recording
+
+
+@contextmanager
+def _laid_out(recording: Path, layout: SavedLayout | None) -> Iterator[Path]:
+    """Yield the recording, or a temporary copy of it with a layout in place of its own."""
+    if layout is None:
+        yield recording
+        return
+    from groundstation.viewer.saved_layout import write_with_layout
+
+    with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
+        copy = Path(folder) / recording.name
+        write_with_layout(recording, layout.content, copy)
+        yield copy

@@ -13,7 +13,7 @@ from groundstation.readers import csv_profile
 from groundstation.readers.drafts.causes import cause_of_numbers, cause_of_times
 from groundstation.readers.drafts.nearest import nearest_names
 from groundstation.readers.drafts.sample import TableSample, sample_of
-from groundstation.readers.layout import METHODS, Key, TableLayout
+from groundstation.readers.layout import METHODS, Key, LayoutRule, TableLayout
 from groundstation.readers.profile_file import load
 from groundstation.readers.profile_fit import Fit
 from groundstation.readers.source import Source
@@ -23,7 +23,8 @@ from groundstation.readers.source import Source
 class ColumnCheck:
     """One column of a table: what it became, its values, what is odd.
 
-    ``became`` is ``time``, a field, or empty for one that is left; ``values`` counts those that could be read.
+    ``became`` is ``time``, a field, or empty for one that is left; ``values`` counts those that could be read. A column
+    that feeds several fields has one of these for each; ``is_first`` marks the first.
     """
 
     name: str
@@ -32,6 +33,7 @@ class ColumnCheck:
     values: int = 0
     shown: str = ""
     cause: str = ""
+    is_first: bool = True
 
 
 @dataclass(frozen=True)
@@ -158,21 +160,27 @@ def _is_unread(column: ColumnCheck) -> bool:
 
 
 def _columns(fit: Fit, layout: TableLayout, values: Mapping[Key, _Values], *, is_timed: bool) -> Iterator[ColumnCheck]:
-    by_place = {rule.column: rule for rule in layout.rules}
+    by_place: dict[int, list[LayoutRule]] = {}
+    for rule in layout.rules:
+        by_place.setdefault(rule.column, []).append(rule)
+    inputs = {key: f"{one.topic}.{one.outputs[0]}" for one in layout.derivations for key in one.inputs}
     sides = {rule.side: rule for rule in layout.rules if rule.side is not None}
     for at, name in enumerate(fit.names):
-        rule = by_place.get(at)
         if at in layout.time.columns:
             yield ColumnCheck(name, "time", values=int(is_timed))
-        elif at in sides:
+            continue
+        if at in sides:
             count = values.get(sides[at].key, _Values()).count
             yield ColumnCheck(name, f"sign of {sides[at].target}", values=count)
-        elif rule is not None:
+            continue
+        for nth, rule in enumerate(by_place.get(at, ())):
             found = values.get(rule.key, _Values())
             known = field_of(*rule.key)
-            is_left = known is None
+            became = rule.target if known is not None else ""
+            if rule.key in inputs and known is None:
+                became = f"input of {inputs[rule.key]}"
             unit = "" if known is None or known.kind != "double" else known.unit
-            yield ColumnCheck(name, "" if is_left else rule.target, unit, found.count, found.shown)
+            yield ColumnCheck(name, became, unit, found.count, found.shown, is_first=nth == 0)
 
 
 def _with_cause(column: ColumnCheck, sample: TableSample) -> ColumnCheck:

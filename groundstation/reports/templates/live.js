@@ -7,13 +7,18 @@
     const bytes = Uint8Array.from(atob(text), (mark) => mark.charCodeAt(0));
     return Array.from(new Float32Array(bytes.buffer), (value) => (Number.isNaN(value) ? null : value));
   });
-  const PX_PER_MM = 3.78, NARROW_PX = 560, TITLED_PX = 16, NEAR = 40;
+  const PX_PER_MM = 3.78, NARROW_PX = 560, TITLED_PX = 16, CHARACTER_PX = 6.6, NEAR = 40;
   const LEFT_PX = 66, BESIDE_PX = 46, GAP_PX = 12, RIGHT_PX = 26; // room for the vertical axis: of a row's first panel, of the others
   const FONT = "12px system-ui, sans-serif", DIGITS = 4; // of a value, within the range of its axis
   const HINT = matchMedia("(pointer: fine)").matches ? "drag to zoom, double-click to go back" : "";
   const timed = []; // plots over flight time: their axes move together
   const colourOf = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const INKS = { "#1c2530": "--ink", "#6b7683": "--faint" };
+  const ground = (colour) => { // a pale shade keeps its hue on dark paper
+    if (colour.length > 7 || !matchMedia("(prefers-color-scheme: dark)").matches) return shown(colour);
+    const parts = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16)), low = Math.min(...parts), high = Math.max(...parts);
+    return `rgb(${parts.map((part) => Math.round(18 + 0.7 * (255 - high) + 48 / Math.max(high - low, 40) * (part - low))).join(" ")})`;
+  };
   const shown = (colour) => {
     const name = INKS[colour.slice(0, 7)];
     return name ? colourOf(name) + colour.slice(7) : colour; // as opaque as it was
@@ -113,10 +118,9 @@
     ctx.beginPath();
     ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
     ctx.clip();
-    ctx.globalAlpha = matchMedia("(prefers-color-scheme: dark)").matches ? 0.22 : 1;
     for (const [low, high, colour] of panel.grounds) {
       const [left, right] = [low, high].map((value) => plot.valToPos(value, "x", true));
-      ctx.fillStyle = colour;
+      ctx.fillStyle = ground(colour);
       ctx.fillRect(Math.min(left, right), bbox.top, Math.abs(right - left), bbox.height);
     }
     ctx.restore();
@@ -165,7 +169,7 @@
       if (!name || entries.has(name)) return;
       const entry = line.appendChild(document.createElement("span"));
       entry.className = kind;
-      entry.append(Object.assign(document.createElement("i"), { style: `color:${shown(colour)}` }), name);
+      entry.append(Object.assign(document.createElement("i"), { style: `color:${kind === "ground" ? ground(colour) : shown(colour)}` }), name);
       entries.set(name, { entry, value: entry.appendChild(document.createElement("b")) });
     };
     for (const panel of panels) {
@@ -241,6 +245,9 @@
     return Math.min(longest, 2 * LEFT_PX) + GAP_PX + (panel.titles[2] ? TITLED_PX + 4 : 0);
   };
 
+  // The title of an upright axis; of one longer than the axis its unit alone: the line above has the whole of it.
+  const fitting = (title, px) => (title && title.length * CHARACTER_PX > px && title.includes(", ") ? title.split(", ").pop() : title);
+
   const plots = [];
   function draw(box, panel, width, height, left, hasTimes, tell) {
     const { data, series, bands } = tables(panel);
@@ -254,7 +261,7 @@
     const names = new Map(panel.names);
     const upright = names.size
       ? { ...axis, grid: { show: false }, size: left, splits: () => [...names.keys()], values: (_, splits) => splits.map((place) => (left > BESIDE_PX ? names.get(place) : "")) }
-      : { ...axis, label: panel.titles[2] || null, size: left - (panel.titles[2] ? axis.labelSize : 0), space: 26, ...splitsOf(panel.log[1]), values: (_, splits) => numbers(splits, panel.log[1]) };
+      : { ...axis, label: fitting(panel.titles[2], panel.place[3] * PX_PER_MM) || null, size: left - (panel.titles[2] ? axis.labelSize : 0), space: 26, ...splitsOf(panel.log[1]), values: (_, splits) => numbers(splits, panel.log[1]) };
     const along = panel.time
       ? { incrs: STEPS, space: 70, values: (_, splits) => (hasTimes ? clocks(splits) : splits.map(() => "")) }
       : { space: 60, ...splitsOf(panel.log[0]), values: (_, splits) => numbers(splits, panel.log[0]) };

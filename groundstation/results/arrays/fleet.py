@@ -7,7 +7,7 @@ class FleetTrend(Arrays, figure="trend"):
     """Control charts: a row per flight, quantity and aircraft, in order of time.
 
     They hold aircraft with enough flights that have a time. ``level`` is the median between change points, ``low`` and
-    ``high`` are the control limits.
+    ``high`` are the control limits; ``limit`` is what the quantity itself shall not reach, NaN where none is stated.
     """
 
     aircraft: Texts
@@ -19,6 +19,7 @@ class FleetTrend(Arrays, figure="trend"):
     low: Floats
     high: Floats
     is_outside: Flags
+    limit: Floats
 
 
 class FleetSkillFlights(Arrays, figure="skill_flights"):

@@ -88,9 +88,8 @@ def cooperative(results: FlightResults) -> Section | None:
         return without_answer(results, "cooperative", TITLE, LEAD)
     best = trusted(answer)
     warning = stations_warning(answer)
+    above = (*((Note(warning, "warn"),) if warning else ()), _advice(answer, best))
     parts: list[Part | None] = [
-        Note(warning, "warn") if warning else None,
-        _advice(answer, best),
         _algorithms(answer, best),
         *stations_parts(answer),
         _costs(answer),
@@ -105,7 +104,7 @@ def cooperative(results: FlightResults) -> Section | None:
         _settings(answer),
     ]
     kept = tuple(part for part in parts if part is not None)
-    return Section("cooperative", TITLE, LEAD, kept, headline=_headline(best))
+    return Section("cooperative", TITLE, LEAD, kept, headline=_headline(best), above=above)
 
 
 def trusted(answer: CooperativeResult) -> AlgorithmRow:
@@ -137,6 +136,12 @@ def _is_safe(row: AlgorithmRow) -> bool:
 def title_of(algorithm: str) -> str:
     """Return the name of an algorithm for people."""
     return TITLES.get(algorithm, words(algorithm))
+
+
+def in_text(algorithm: str) -> str:
+    """Return that name within a sentence."""
+    title = title_of(algorithm)
+    return f"{title[:1].lower()}{title[1:]}"
 
 
 def state_of(row: AlgorithmRow | SessionRow) -> Mark:
@@ -178,7 +183,7 @@ def session_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -
             (
                 "Knowable on board",
                 _metres(on_board.two_sigma_r_session_m, "m"),
-                f"2σ_r, {title_of(on_board.algorithm)}; {_metres(on_board.two_sigma_r_m, 'm')} at the end",
+                f"2σ_r, {in_text(on_board.algorithm)}; {_metres(on_board.two_sigma_r_m, 'm')} at the end",
             )
         )
     if best.messages:
@@ -217,7 +222,7 @@ def _reason(answer: CooperativeResult, best: AlgorithmRow) -> str:
     if best.algorithm != answer.default_algorithm:
         return (
             f"{name} has the least error of the algorithms that neither diverge nor are overconfident; the default, "
-            f"{title_of(answer.default_algorithm)}, is not among them."
+            f"{in_text(answer.default_algorithm)}, is not among them."
         )
     if best.is_consistent:
         return f"{name}: its errors against the truth are consistent with its computed sigma, and it does not diverge."
@@ -296,7 +301,7 @@ def _vehicles(answer: CooperativeResult, best: AlgorithmRow) -> Grid:
         for row in answer.vehicles
         if row.algorithm == best.algorithm
     ]
-    return Grid(f"Aircraft, {title_of(best.algorithm)}", VEHICLE_HEADS, rows, numbers=("cooperative_tracks",))
+    return Grid(f"Aircraft, {in_text(best.algorithm)}", VEHICLE_HEADS, rows, numbers=("cooperative_tracks",))
 
 
 def _geometry(answer: CooperativeResult) -> Grid | None:
@@ -337,7 +342,7 @@ def _links(answer: CooperativeResult) -> Grid | None:
         for row in ordered[:MOST_LINKS]
     ]
     caption = (
-        f"Residuals of the ranges as predicted by {title_of(answer.links_algorithm)}, worst first; NIS: squared "
+        f"Residuals of the ranges as predicted by {in_text(answer.links_algorithm)}, worst first; NIS: squared "
         "residual over its computed variance, 1 is honest."
     )
     if len(ordered) > len(rows):

@@ -14,6 +14,7 @@ from groundstation.systems.cooperative.answer import CooperativeResult
 from groundstation.systems.cooperative.arrays import CooperativeGeometry, CooperativeLinks
 from groundstation.systems.cooperative.chapter import cooperative as chapter
 from groundstation.systems.cooperative.chapter import worst_first
+from groundstation.systems.cooperative.plots import errors_over_time
 from groundstation.systems.cooperative.space_tab import space
 from groundstation.viewer import colours
 from groundstation.viewer.names import clean_text, path_parts
@@ -36,7 +37,7 @@ def cooperative(recorder: Recorder, results: FlightResults) -> rrb.Container:
     recorder.document("cooperative/answer", markdown(section))
     text = document("Algorithms, geometry and links", "cooperative/answer")
     left = [*space(recorder, answer, results), text]
-    middle = panels_of(recorder, plot_of(recorder, "cooperative.errors", results))
+    middle = panels_of(recorder, errors_over_time(results))
     geometry = panels_of(recorder, plot_of(recorder, "cooperative.geometry", results))
     right = [*_sources(recorder, answer, results), *geometry, *_links(recorder, answer, results)]
     columns = [rrb.Vertical(contents=column) for column in (left, middle, right) if column]

@@ -35,7 +35,7 @@ def _has_rows(flight: "Flight", _known: Known) -> bool:
 
 def _sentence(answers: Answers) -> str:
     answer = answer_of(answers, GnssReception)
-    return "" if answer is None else answer.sentence
+    return "" if answer is None else answer.line
 
 
 def _share(*states: str) -> "AnswerColumn[GnssReception]":

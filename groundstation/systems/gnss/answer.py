@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
+from groundstation.results.frames import Brief
 from groundstation.results.roles import WordsOfRecord
 
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
@@ -146,7 +147,7 @@ class VelocityAgainstPosition:
 
 
 @dataclass(frozen=True)
-class GnssReceiver:
+class GnssReceiver(Brief):
     """Reception of one receiver.
 
     Medians and shares are of time with a fix; ``*_low`` and ``*_high`` leave one twentieth of the time beyond them.
@@ -258,6 +259,17 @@ class GnssReception(Answer, WordsOfRecord):
     def receiver(self) -> GnssReceiver:
         """The one of which the sentence speaks."""
         return next(one for one in self.receivers if one.topic == self.main)
+
+    @property
+    def against(self) -> str:
+        """First reason against the reception that the sentence does not tell; empty without one."""
+        reasons = self.reasons if self.grade in ("warn", "bad") else ()
+        return next((one for one in reasons if not one.startswith("RTK not fixed") and one not in self.sentence), "")
+
+    @property
+    def line(self) -> str:
+        """The sentence, behind what is against the reception."""
+        return "; ".join(filter(None, (self.against, self.sentence)))
 
     @property
     def words_of_record(self) -> Mapping[str, str]:

@@ -68,21 +68,15 @@ def _claim(answer: GnssReception) -> Claim:
         claimed = "" if stood.claimed_m is None else f"{length_text(stood.claimed_m)} claimed"
         told.append(("Scatter", length_text(stood.scatter_m), claimed))
     figures = tuple(one for one in told if one[1] != "—")
-    above = _against(answer)
+    above = answer.against
     sentences = tuple(with_full_stop(typeset(reason)) for reason in answer.reasons if reason != above)
     return Claim(Rank.GNSS, MARKS[answer.grade], _headline(answer), value, remark, sentences, figures)
 
 
 def _headline(answer: GnssReception) -> str:
     """Return the sentence, behind what is against the reception, with a capital."""
-    told = "; ".join(filter(None, (_against(answer), answer.sentence)))
+    told = answer.line
     return typeset(f"{told[:1].upper()}{told[1:]}")
-
-
-def _against(answer: GnssReception) -> str:
-    """Return the first reason against the reception that the sentence does not tell."""
-    reasons = answer.reasons if answer.grade in ("warn", "bad") else ()
-    return next((one for one in reasons if not one.startswith("RTK not fixed") and one not in answer.sentence), "")
 
 
 def _states(answer: GnssReception) -> Grid:

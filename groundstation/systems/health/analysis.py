@@ -12,7 +12,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.results.answer import Answers, answer_of
 from groundstation.systems.analysis import Analysis, Found, Shortfall
-from groundstation.systems.health.answer import AutopilotHealth, Check, Happening
+from groundstation.systems.health.answer import HEADLINES, AutopilotHealth, Check, Happening
 from groundstation.systems.health.columns import COLUMNS
 from groundstation.systems.health.settings import HealthSettings
 from groundstation.systems.known import Known
@@ -94,6 +94,7 @@ def _read(flight: "Flight", known: Known) -> _Read:
         Where the log holds nothing that a check judges.
     """
     from groundstation.systems.health.autopilots import autopilot_of
+    from groundstation.systems.health.ending import ends_in_the_air
     from groundstation.systems.health.evidence import in_the_air
     from groundstation.systems.health.parameters import events as events_of_settings
     from groundstation.systems.health.parameters import settings_of
@@ -106,7 +107,8 @@ def _read(flight: "Flight", known: Known) -> _Read:
     if not events and not any(bool(np.isfinite(one.value).any()) for one in evidence):
         raise NotAssessableError(CODE, "the log holds no field that a check of the autopilot judges")
     air, stated = in_the_air(flight, known), settings_of(flight, known)
-    return _Read(autopilot.name, air, evidence, (*events, *events_of_settings(stated, air)), stated)
+    every = (*events, *events_of_settings(stated, air), *ends_in_the_air(flight, air))
+    return _Read(autopilot.name, air, evidence, every, stated)
 
 
 def _checked(flight: "Flight", known: Known, settings: HealthSettings) -> _Checked:
@@ -180,7 +182,7 @@ def _applies(flight: "Flight", _known: Known) -> bool:
 
 def _sentence(answers: Answers) -> str:
     answer = answer_of(answers, AutopilotHealth)
-    return "" if answer is None else f"autopilot health {answer.verdict.replace('_', ' ')}: {answer.sentence}"
+    return "" if answer is None else f"autopilot health {HEADLINES[answer.verdict].lower()}: {answer.sentence}"
 
 
 HEALTH = Analysis(

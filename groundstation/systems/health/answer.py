@@ -1,14 +1,17 @@
 """Answer of autopilot health: verdict of each check and of the flight."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
+from groundstation.results.frames import Brief
 
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
 
 Verdict = Literal["pass", "warn", "fail", "not_logged"]
+HEADLINES: Mapping[Verdict, str] = {"pass": "Healthy", "warn": "Warnings", "fail": "Failed", "not_logged": "Not logged"}
 WHOLE_LOG = "in the whole log"  # what is judged where nothing says that it flew
 FIRST = ("gnss", "innovations", "vibration")  # checks that a flight's sentence and chapter always tell
 
@@ -122,7 +125,7 @@ class Measure:
 
 
 @dataclass(frozen=True)
-class Check:
+class Check(Brief):
     """One check: its verdict, why, and the quantities behind it.
 
     ``events_in_air`` counts warnings and failures that were logged in the air; ``first_event_s`` is the flight time of

@@ -14,6 +14,7 @@ from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.health.ardupilot_sensors import supply
 from groundstation.systems.health.evidence import Evidence
+from groundstation.systems.health.lean import between, down_of
 from groundstation.systems.health.logged import (
     FloatArray,
     Series,
@@ -137,6 +138,9 @@ def tracking(flight: Flight) -> Iterator[Evidence]:
                 source = f"{topic}.{', '.join(wanted)}"
                 sensor = "roll and pitch"
                 yield Evidence("tracking", "attitude_tracking_deg", sensor, source, "deg", table.time_ns, value)
+                off = between(*(down_of(*(table.values(name) for name in names)) for names in (wanted, had)))
+                off[np.isnan(value)] = np.nan
+                yield Evidence("tracking", "attitude_lost_deg", "", source, "deg", table.time_ns, off)
             break
     if "raw.RATE" in flight and is_number(flight["raw.RATE"], "RDes", "R", "PDes", "P"):
         table = flight["raw.RATE"]

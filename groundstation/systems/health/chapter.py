@@ -9,14 +9,13 @@ from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Cell, Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, Tone
 from groundstation.chapters.wording import ABSENT, clean, clock, number, percent, significant, typeset
 from groundstation.results.flight import FlightResults
-from groundstation.systems.health.answer import FIRST, AutopilotHealth, Check, Happening, Measure, Verdict
+from groundstation.systems.health.answer import FIRST, HEADLINES, AutopilotHealth, Check, Happening, Measure, Verdict
 from groundstation.systems.health.plots import SIGNS, sign_of
 
 TITLE = "Autopilot health"
 LEAD = "Was GNSS good, was the filter healthy, and what went wrong when."
 TONES: Mapping[Verdict, Tone] = {"pass": "good", "warn": "warn", "fail": "bad", "not_logged": "unknown"}
 WORDS: Mapping[Verdict, str] = {"pass": "pass", "warn": "warn", "fail": "fail", "not_logged": "not logged"}
-HEADLINES: Mapping[Verdict, str] = {"pass": "Healthy", "warn": "Warnings", "fail": "Failed", "not_logged": "Not logged"}
 GRADES: Mapping[str, Mark] = {"info": Mark("plain", "info"), "warn": Mark("warn", "warn"), "fail": Mark("bad", "fail")}
 MOST_LISTED = 40
 LONGEST_WHOLE = 1e10  # a parameter of 32 bits has ten digits

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from groundstation.systems.health.evidence import Evidence, FloatArray
+from groundstation.systems.health.lean import between, down_of
 from groundstation.systems.health.px4_topics import Topic, evidence_of, newest, topic, topics
 from groundstation.tables.table import Flight
 
@@ -114,22 +115,20 @@ def _attitude(flight: Flight) -> Iterator[Evidence]:
     if wanted.has("q_d[0]") and bool((np.abs(wanted.values("q_d[0]")) > 0.0).any()):
         asked, field = _down(wanted.vector("q_d", 4)), "q_d"
     elif wanted.has("roll_body", "pitch_body"):
-        roll, pitch = wanted.values("roll_body"), wanted.values("pitch_body")
-        asked = np.column_stack([-np.sin(pitch), np.cos(pitch) * np.sin(roll), np.cos(pitch) * np.cos(roll)])
+        asked = down_of(np.rad2deg(wanted.values("roll_body")), np.rad2deg(wanted.values("pitch_body")))
         field = "roll_body"
     else:
         return
     asked_at = newest(wanted, asked, attitude.time_ns, SETPOINT_OLD_S)
     mode = topic(flight, "vehicle_control_mode")
-    with np.errstate(invalid="ignore"):
-        off = np.rad2deg(np.arccos(np.clip(np.sum(down * asked_at, axis=1), -1.0, 1.0)))
+    off = between(down, asked_at)
     if mode is not None and mode.has("flag_control_attitude_enabled"):
         flown = newest(mode, mode.values("flag_control_attitude_enabled"), attitude.time_ns, 2.0)
         off[flown == 0.0] = np.nan
     if np.isfinite(off).any():
-        yield Evidence(
-            *("tracking", "attitude_tracking_deg", "tilt", wanted.source(field), "deg"), attitude.time_ns, off
-        )
+        source = wanted.source(field)
+        yield Evidence("tracking", "attitude_tracking_deg", "tilt", source, "deg", attitude.time_ns, off)
+        yield Evidence("tracking", "attitude_lost_deg", "", source, "deg", attitude.time_ns, off)
 
 
 def _rates(flight: Flight) -> Iterator[Evidence]:

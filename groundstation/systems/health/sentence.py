@@ -10,6 +10,7 @@ from groundstation.base.words import clock_text, listed
 from groundstation.systems.health.answer import FIRST, Check
 
 MOST_BAD = 4
+LOST = "attitude_lost_deg"
 MORE = re.compile(r" and \d+ more$")
 MOSTLY = 0.8  # of the time: a longer span is "throughout"
 QUOTED = ("faults", "battery", "gnss", "link")  # checks of which what was said is quoted
@@ -35,6 +36,7 @@ WARN: Mapping[str, str] = {
     "settings": "settings differ from what was found",
 }
 OF_QUANTITY: Mapping[str, str] = {  # what a person says where this quantity decided
+    LOST: "control of attitude lost",
     "attitude_difference_deg": "estimators disagree",
     "position_difference_m": "estimators disagree",
     "output_angle_rad": "output predictor off",
@@ -78,7 +80,7 @@ def told(checks: Sequence[Check]) -> str:
     """
     known = {one.key: one for one in checks}
     first = [known[key] for key in FIRST if key in known]
-    bad = sorted((one for one in checks if one.is_bad), key=lambda one: (_gravity(one), one.key not in FIRST))
+    bad = sorted((one for one in checks if one.is_bad), key=_gravity)
     parts = [_part(one) for one in bad[:MOST_BAD]]
     if len(bad) > MOST_BAD:
         parts.append(f"and {len(bad) - MOST_BAD} more")
@@ -89,8 +91,13 @@ def told(checks: Sequence[Check]) -> str:
     return shown[:1].upper() + shown[1:]
 
 
-def _gravity(check: Check) -> bool:
-    return check.verdict != "fail"
+def _gravity(check: Check) -> tuple[bool, bool, bool]:
+    """Return what orders the checks.
+
+    Failed ones come first, of those a lost attitude, then GNSS, filter and vibration.
+    """
+    is_lost = check.decisive is not None and check.decisive.quantity == LOST
+    return check.verdict != "fail", not is_lost, check.key not in FIRST
 
 
 def _part(check: Check) -> str:

@@ -173,13 +173,21 @@ def _sentence(answers: Answers) -> str:
     if inertial.radial_error_rate_fit_nmiph is not None:
         parts.append(f"{inertial.radial_error_rate_fit_nmiph:.2f} nmi/h")
     elif inertial.navigation_start is not None and inertial.navigation_start.time_s is None:
-        parts.append("no rate: start of navigation not known")
+        parts.append(_growth(inertial))
     if forecast is not None:
         shipped = [row for row in forecast.skill if row.method == forecast.default_method]
         longest = max(shipped, key=lambda row: row.horizon_min, default=None)
         if longest is not None:
             parts.append(f"forecast {longest.rms_m:.0f} m after {longest.horizon_min:g} min")
     return f"INS {', '.join(parts)}" if parts else "INS errors estimated"
+
+
+def _growth(inertial: InertialResult) -> str:
+    """Return the position error at the ends of a log that does not show when navigation began."""
+    first, last, hours = inertial.radial_error_first_m, inertial.radial_error_last_m, inertial.compared_hours
+    if first is None or last is None or hours is None:
+        return "no rate: start of navigation not known"
+    return f"error {first:.0f} m at first, {last:.0f} m after {60.0 * hours:.0f} min"
 
 
 def _is_main_of_forecast(path: str, saved: tuple[Mapping[str, Any], ...]) -> bool:

@@ -12,7 +12,7 @@ from groundstation.results.answer import Answer
 from groundstation.results.corrected_position import BestTrack, CorrectedPosition, MadeTrack
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
-from groundstation.results.frames import rows_frame
+from groundstation.results.frames import Brief, rows_frame
 from groundstation.results.roles import AzimuthByTurns, AzimuthEstimate, ErrorsAlongTheFlight, KindOfIns
 from groundstation.systems.inertial.arrays import InertialStates, InertialTrack
 
@@ -50,7 +50,7 @@ class StateEstimate:
 
 
 @dataclass(frozen=True)
-class ChannelResult:
+class ChannelResult(Brief):
     """One horizontal channel, ``north`` or ``east``.
 
     Error = INS - truth, innovation = measured - predicted. ``nis`` is the mean normalised innovation squared per
@@ -337,7 +337,7 @@ class InertialResult(Answer, KindOfIns, AzimuthByTurns, BestTrack, ErrorsAlongTh
 
     def table_names(self) -> tuple[str, ...]:
         """Names that :meth:`to_frame` takes."""
-        return ("states", "channels", *super().table_names())
+        return ("states", "channels", *(name for name in super().table_names() if not name.endswith(".states")))
 
     def to_frame(self, table: str = "states") -> "pd.DataFrame":
         """Return a list of rows as a frame (see :class:`Tabular`).

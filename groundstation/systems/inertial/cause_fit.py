@@ -61,7 +61,7 @@ MEASURED = CHANNELS[:, [POSITION, VELOCITY]].T.ravel()  # position north, east; 
 SLOW = CHANNELS[:, [DRIFT_RATE, RANDOM_DRIFT]].ravel()  # random at the start as later
 MOST_RESETS = 8
 # What an accelerometer is off its constant in a flight, by its random part, its scale and the bank of turns, as a share
-# of the class's bias: so large that intervals hold on simulated flights that turn (docs/inertial.md).
+# of the class's bias: so large that intervals hold on simulated flights that turn (docs/evidence/inertial.md).
 IN_RUN = 0.2
 LEAST_EPOCHS = 12  # two minutes of means over ten seconds
 KEPT = kalman.KeptArrays(covariances=False, gains=False)

@@ -59,12 +59,29 @@ def headline(fleet: FleetResults) -> FleetSkill | None:
 
 
 def figures(fleet: FleetResults) -> tuple[KeyFigure, ...]:
-    """Return the RMS error of the shipped method."""
+    """Return the RMS error of the shipped method on an aircraft, of several the ends."""
     row = headline(fleet)
     if row is None:
         return ()
+    title, each = f"Forecast, {row.horizon_min:g} min", by_aircraft(fleet, row)
     remark = f"RMS over {number(row.starts, 0)} starts on {plural(row.flights, 'flight')}"
-    return ((f"Forecast, {row.horizon_min:g} min", bounded(row.rms_m, 0, "m"), remark),)
+    if len(each) < 2:
+        return ((title, bounded(row.rms_m, 0, "m"), remark),)
+    low, high = bounded(min(each.values()), 0), bounded(max(each.values()), 0, "m")
+    return ((title, f"{low} … {high}", f"{plural(len(each), 'aircraft', 'aircraft')}; {remark}"),)
+
+
+def by_aircraft(fleet: FleetResults, row: FleetSkill) -> dict[str, float]:
+    """Return the RMS error of a method at a horizon on each aircraft, merged by the starts."""
+    table = fleet.skill_flights
+    rows = (table.method == row.method) & (table.horizon_min == row.horizon_min) & np.isfinite(table.rms_m)
+    owner, starts, squares = table.aircraft[rows], table.starts[rows], table.rms_m[rows] ** 2
+    merged = {}
+    for name in np.unique(owner).tolist():
+        mine = owner == name
+        if (count := float(starts[mine].sum())) > 0.0:
+            merged[name] = float(np.sqrt(np.sum(starts[mine] * squares[mine]) / count))
+    return merged
 
 
 def method_title(name: str) -> str:

@@ -36,11 +36,16 @@ def build(fleet: FleetResults) -> Section | None:
 
 
 def figures(fleet: FleetResults) -> tuple[KeyFigure, ...]:
-    """Return the median rate of the unaided flights."""
-    rate, flights = median_rate(fleet)
-    if rate is None:
+    """Return the median rate of an aircraft; of several the lowest and the highest."""
+    rates = unaided_figures(fleet, RATE)
+    if not rates:
         return ()
-    return (("INS drift", bounded(rate, 2, "nmi/h"), f"median of {plural(flights, 'unaided flight')}"),)
+    flights = plural(sum(map(len, rates.values())), "unaided flight")
+    medians = [float(np.median(own)) for own in rates.values()]
+    if len(medians) == 1:
+        return (("INS drift", bounded(medians[0], 2, "nmi/h"), f"median of {flights}"),)
+    told = f"medians of {plural(len(medians), 'aircraft', 'aircraft')}, {flights}"
+    return (("INS drift", f"{bounded(min(medians), 2)} … {bounded(max(medians), 2, 'nmi/h')}", told),)
 
 
 def _has_rate(fleet: FleetResults) -> NDArray[np.bool_]:
@@ -53,13 +58,6 @@ def unaided_figures(fleet: FleetResults, quantity: str) -> dict[str, Any]:
     rows = _has_rate(fleet) & (fleet.flights["ins_kind"] == "unaided")
     owner, values = fleet.flights["aircraft"][rows], fleet.flights[quantity][rows]
     return {name: values[owner == name] for name in np.unique(owner).tolist()}
-
-
-def median_rate(fleet: FleetResults) -> tuple[float | None, int]:
-    """Return the median rate of the unaided flights, nmi/h, and the number of these flights."""
-    rate = fleet.flights[RATE][fleet.flights["ins_kind"] == "unaided"]
-    rate = rate[np.isfinite(rate)]
-    return (float(np.median(rate)), len(rate)) if len(rate) else (None, 0)
 
 
 def _table(rates: dict[str, Any]) -> Grid:

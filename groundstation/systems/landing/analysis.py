@@ -65,6 +65,7 @@ SATELLITES = "GPS"  # as recorders name the source of guidance
 TURN_S = 180.0  # before a final, in which it is turned onto the course
 SET_DOWN = "comes down too slowly to roll, as a helicopter does: no touchdown on wheels"
 MOST_ANALYSED = 50  # a log of many circuits takes no longer
+MOST_OF_A_LINE = 3  # approaches that the line of a flight tells
 
 
 @dataclass(frozen=True, eq=False)
@@ -363,7 +364,10 @@ def _rests_on(_flight: "Flight", answer: LandingResult) -> RestsOn:
 
 def _sentence(answers: Answers) -> str:
     answer = answer_of(answers, LandingResult)
-    return "" if answer is None else "; ".join(sentence_of(one) for one in answer.approaches[:3])
+    if answer is None or answer.last is None:
+        return ""
+    others = [one for one in answer.approaches if one is not answer.last]
+    return "; ".join(sentence_of(one) for one in (answer.last, *others[: MOST_OF_A_LINE - 1]))
 
 
 def sentence_of(one: Approach) -> str:

@@ -1,17 +1,22 @@
 """Approaches of a recorded flight: path against the runway's, touchdown, accuracy."""
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import ClassVar, Literal
 
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
+from groundstation.results.frames import Brief
 from groundstation.results.gates import Gate
 from groundstation.systems.landing.criteria_answer import Criterion, Place, Score
+from groundstation.systems.landing.events_answer import LandingEvent
 from groundstation.systems.landing.runway_answer import RunwayUsed as RunwayUsed
 from groundstation.systems.landing.touchdown_answer import Touchdown
 
 Outcome = Literal["landing", "touch-and-go", "go-around"]
 Measured = Literal["measured", "not measured"]
+MOST_TOLD = 4  # approaches in the text of an answer
 GLIDE_SLOPE_DOT = 0.12  # a dot is so much of the glide angle (ICAO Annex 10, volume I, 3.1.5.6.2)
 
 
@@ -59,7 +64,7 @@ class StabilityLost:
 
 
 @dataclass(frozen=True)
-class StabilisedAt:
+class StabilisedAt(Brief):
     """Criteria of a stabilised approach, from a check height down to the start of the flare.
 
     ``gates`` are the criteria; without any, ``reason`` says why none was measured. Criteria that are not in the log
@@ -234,7 +239,7 @@ class Protection:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Approach:
+class Approach(Brief):
     """One approach.
 
     Times are flight seconds; distances are before the threshold, behind it negative.
@@ -295,3 +300,43 @@ class LandingResult(Answer):
     remarks: tuple[str, ...] = ()
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
+
+    @property
+    def last(self) -> Approach | None:
+        """The last landing, or the last approach of a flight without one."""
+        landings = [one for one in self.approaches if one.outcome != "go-around"]
+        return next(reversed(landings or self.approaches), None)
+
+    @property
+    def events(self) -> tuple[LandingEvent, ...]:
+        """Events of all approaches in order of time: from the start of each to its end."""
+        every = dict.fromkeys(one for made in self.approaches for one in _events(made))
+        return tuple(sorted(every, key=lambda one: one.time_s))
+
+    def __repr__(self) -> str:
+        told = [f"{one.number}: {one.outcome} on runway {one.runway.name or 'not known'}" for one in self.approaches]
+        more = f"; and {len(told) - MOST_TOLD} more" if len(told) > MOST_TOLD else ""
+        return f"<LandingResult {'; '.join(told[:MOST_TOLD]) or 'no approach'}{more}>"
+
+
+def _events(made: Approach) -> Iterator[LandingEvent]:
+    new = partial(LandingEvent, approach=made.number)
+    yield new(time_s=made.start_s, event="start")
+    if (on := made.established) is not None:
+        yield new(time_s=on.start_s, event="established", height_m=on.start_height_m)
+        yield new(time_s=on.end_s, event="end of established", height_m=on.end_height_m)
+    for lost in (check.lost for check in made.stabilised if check.lost is not None):
+        yield new(time_s=lost.time_s, event="limit left", what=lost.criterion, height_m=lost.height_m)
+    places = {one.name: one.at for one in made.criteria if one.at is not None}
+    for one in made.criteria:
+        if one.state == "not met" and (at := places.get(one.name)) is not None:
+            seen = new(time_s=at.time_s, event="criterion not met", what=one.name, value=one.value, unit=one.unit)
+            yield replace(seen, height_m=at.height_m, before_threshold_m=at.before_threshold_m)
+    if (down := made.touchdown) is not None:
+        behind_m = None if down.past_threshold_m is None else -down.past_threshold_m
+        before_m = places["touchdown"].before_threshold_m if "touchdown" in places else behind_m
+        yield new(time_s=down.time_s, event="touchdown", what=down.found_by, before_threshold_m=before_m)
+        for again in down.second_contacts:
+            unit = "" if again.load_g is None else "g"
+            yield new(time_s=again.time_s, event="second contact", what=again.found_by, value=again.load_g, unit=unit)
+    yield new(time_s=made.end_s, event="end", what=made.outcome)

@@ -90,17 +90,16 @@ def landing(results: FlightResults) -> Section | None:
 
 def _claim(answer: LandingResult) -> Claim | None:
     """Return the last landing, or the last approach of a flight without one."""
-    if not answer.approaches:
+    one = answer.last
+    if one is None:
         return None
-    landings = [one for one in answer.approaches if one.outcome != "go-around"]
-    one = (landings or answer.approaches)[-1]
     state = _verdict(one)
     others = len(answer.approaches) - 1
     also = f" {others} more {'approach' if others == 1 else 'approaches'} in the log." if others else ""
     return Claim(
         Rank.LANDING_OPEN if state.text == NOT_MEASURED else Rank.LANDING,
         Mark(state.tone, state.text.capitalize()),
-        f"{_name(one)[:1].upper()}{_name(one)[1:]}: {state.text}",
+        f"{_name(one)[:1].upper()}{_name(one)[1:]}",
         value=state.text.capitalize(),
         remark=_name(one),
         sentences=(f"{_why(one)}{also}",),

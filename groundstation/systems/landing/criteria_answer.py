@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 CriterionState = Literal["met", "not met", "undecided", "no limit", "not measured", "not logged"]
 Group = Literal["approach", "threshold", "landing"]
@@ -97,6 +97,13 @@ class Criterion:
     at: Place | None = None
     logged_by: str = ""
     reason: str = ""
+
+    also_in_frames: ClassVar = ("title",)
+
+    @property
+    def title(self) -> str:
+        """Name in words."""
+        return self.kind.title
 
     @property
     def kind(self) -> CriterionKind:

@@ -1,6 +1,7 @@
 """Monte Carlo study of the criteria: does a verdict say what was flown?
 
-The family is that of docs/approaches.md, written down before it was run. The other families each break one assumption.
+The family is that of docs/evidence/approaches.md, written down before it was run. The other families each break one
+assumption.
 """
 
 from collections import Counter
@@ -98,8 +99,8 @@ def study_criteria(
     data = table_of("landing_criteria", rows, DIGITS)
     page = section(
         "Study: the criteria of an approach",
-        f"{runs} approaches of each family of docs/approaches.md (seed {seed}), through phases and analysis. Share "
-        "of the decided verdicts that are wrong, with Wilson's 95 % interval; an undecided one is not wrong.",
+        f"{runs} approaches of each family of docs/evidence/approaches.md (seed {seed}), through phases and analysis. "
+        "Share of the decided verdicts that are wrong, with Wilson's 95 % interval; an undecided one is not wrong.",
         table(data),
         *(f"{family.name}: {family.what}" for family in families),
     )

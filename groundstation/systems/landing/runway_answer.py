@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from groundstation.results.frames import Brief
+
 PlacedBy = Literal["site file", "runway table", "positions"]
 ChoiceState = Literal["decided", "not decided", "none"]
 
@@ -30,7 +32,7 @@ class RunwayCandidate:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunwayChoice:
+class RunwayChoice(Brief):
     """Search of the runway table.
 
     Parameters
@@ -53,7 +55,7 @@ class RunwayChoice:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunwayUsed:
+class RunwayUsed(Brief):
     """The runway an approach is measured against.
 
     Parameters

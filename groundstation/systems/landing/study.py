@@ -1,8 +1,8 @@
 """Monte Carlo study of the localizer as a reference for position errors.
 
-Does the 95 % interval of the error of positions hold the truth? The family is that of docs/approaches.md, written down
-before it was run: finals on any course anywhere, INS errors of some hundred metres, positions in steps of 153 m, an ILS
-of category I within its tolerances. The other families each break one assumption.
+Does the 95 % interval of the error of positions hold the truth? The family is that of docs/evidence/approaches.md,
+written down before it was run: finals on any course anywhere, INS errors of some hundred metres, positions in steps of
+153 m, an ILS of category I within its tolerances. The other families each break one assumption.
 """
 
 from collections.abc import Callable
@@ -230,8 +230,8 @@ ROLL_OUT_AFTER_S = 25.0  # the middle of the roll-out after the threshold: what 
 def _page(data: FigureData, families: tuple[ApproachFamily, ...], runs: int, seed: int) -> tuple[Section, ...]:
     head = section(
         "Study: the localizer as a reference for recorded positions",
-        f"{runs} approaches of each family of docs/approaches.md (seed {seed}), each through phases and analysis, with "
-        "the runway in a site file. Coverage: share of runs whose 95 % interval holds the truth.",
+        f"{runs} approaches of each family of docs/evidence/approaches.md (seed {seed}), each through phases and "
+        "analysis, with the runway in a site file. Coverage: share of runs whose 95 % interval holds the truth.",
         table(data),
         *(f"{family.name}: {family.what}" for family in families),
     )

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from groundstation.results.frames import Brief
+
 SINK_S = 1.0  # before the touchdown, over which the sink rate is taken
 LAST_SINK_S = 0.5  # the same behind the flare, where the best trajectory shows it
 PEAK_S = 2.0  # about the touchdown, within which the peak load is sought
@@ -78,7 +80,7 @@ class TouchdownByStates:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Touchdown:
+class Touchdown(Brief):
     """Place, time and manner in which the wheels met the ground.
 
     Parameters

@@ -1,6 +1,7 @@
 """Monte Carlo study of the touchdown: does its interval hold the contact?
 
-The family is that of docs/approaches.md, written down before it was run; the other families each break one assumption.
+The family is that of docs/evidence/approaches.md, written down before it was run; the other families each break one
+assumption.
 """
 
 from collections.abc import Callable
@@ -231,9 +232,9 @@ def _median(values: ArrayLike) -> float:
 def _page(data: FigureData, families: tuple[TouchdownFamily, ...], runs: int, seed: int) -> tuple[Section, ...]:
     head = section(
         "Study: the touchdown by its witnesses",
-        f"{runs} landings of each family of docs/approaches.md (seed {seed}); those without any witness are not "
-        "measured. Coverage: share of runs whose 95 % interval holds the contact. Second contact: share of the logs "
-        "with a fast load in which one is told (in the family of bounces: the true one).",
+        f"{runs} landings of each family of docs/evidence/approaches.md (seed {seed}); those without any witness are "
+        "not measured. Coverage: share of runs whose 95 % interval holds the contact. Second contact: share of the "
+        "logs with a fast load in which one is told (in the family of bounces: the true one).",
         table(data),
         *(f"{family.name}: {family.what}" for family in families),
     )

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from groundstation.base.signals import is_canonical, kind_of
 from groundstation.chapters.assessed import reason_of
 from groundstation.chapters.chapter import Advice, Remedies
 from groundstation.results.flight import FlightResults
@@ -29,14 +30,26 @@ BY_WIND = Advice("Record", "a true heading with no compass in it", COMPASS)
 BY_HEADING = Advice("Check", "true heading and declination", COMPASS)
 
 
+def has_compass(results: FlightResults) -> bool:
+    """Tell whether the log holds values of a compass: a field, or a magnetic heading."""
+    return any(
+        one.fields[name].present
+        for topic, one in results.ledger.topics.items()
+        for name in one.fields
+        if kind_of(topic) == "magnetometer" or (is_canonical(topic) and name == "magnetic_heading_deg")
+    )
+
+
 def advise(results: FlightResults) -> Iterator[Advice]:
     """Yield what would better the answer on the compass, or give the one of a magnetometer.
 
-    A log with a compass that gives heading alone needs no magnetometer: its legs are judged.
+    A log with a compass that gives heading alone needs no magnetometer: its legs are judged. Nor does one without any
+    compass: there is no deviation to find.
     """
     answer = results.answer(FluxDeviation)
     if answer is None:
-        if NO_SENSOR in reason_of(results, "magnetic") and not reason_of(results, FluxDeviation.analysis):
+        is_asked = NO_SENSOR in reason_of(results, "magnetic") and not reason_of(results, FluxDeviation.analysis)
+        if is_asked and has_compass(results):
             yield Advice("Record", "a three-axis magnetometer", DEVIATION)
         return
     for gate in answer.gates:

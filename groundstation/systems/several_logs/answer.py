@@ -5,6 +5,7 @@ from typing import ClassVar, Literal
 
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
+from groundstation.results.frames import Brief
 
 JoinMethod = Literal["own_clock", "gnss_time", "motion", "gnss_time_and_motion", "file_time"]
 
@@ -36,7 +37,7 @@ class JoinedStretch:
 
 
 @dataclass(frozen=True)
-class JoinedLog:
+class JoinedLog(Brief):
     """One of the logs of a flight.
 
     Parameters

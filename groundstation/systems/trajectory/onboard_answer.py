@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from groundstation.base.words import clock_text, with_half
+from groundstation.results.frames import Brief
 from groundstation.systems.trajectory.quantity_answer import OPENING_ERROR, Quantity
 
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
@@ -48,7 +49,7 @@ class ChangeOfConstant:
 
 
 @dataclass(frozen=True)
-class OnboardError:
+class OnboardError(Brief):
     """Error of the on-board filter in one quantity: its output minus the smoothed solution.
 
     Parameters
@@ -105,7 +106,7 @@ class OnboardError:
 
 
 @dataclass(frozen=True)
-class OnboardErrors:
+class OnboardErrors(Brief):
     """Errors of the on-board filter of one topic, by quantity.
 
     Parameters

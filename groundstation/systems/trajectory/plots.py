@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from groundstation.base.angles import interpolate_heading, wrap_360
-from groundstation.base.ellipse import ELLIPSE_95, magnified, outlines
+from groundstation.base.ellipse import ELLIPSE_95, fits, magnified, outlines, told_ellipses
 from groundstation.base.geodesy import on_earth, plan_north_east_m
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.chapters.plots.common import has_values, span
@@ -54,7 +54,7 @@ def track_map(results: FlightResults) -> Plot | None:
     north, east = plan_north_east_m(latitude, longitude, *origin)
     extent = max(float(np.nanmax(one) - np.nanmin(one)) for one in (north, east))
     scale, unit = (1e-3, "km") if extent > LARGEST_IN_METRES else (1.0, "m")
-    rings, larger = _rings(data, north, east, extent)
+    rings, larger, wider = _rings(data, north, east, extent)
     marks: list[AnyMark] = [
         Outlines(
             rings=tuple(scale * ring[:, ::-1] for ring in rings),
@@ -62,6 +62,7 @@ def track_map(results: FlightResults) -> Plot | None:
             role="answer",
             emphasis="thin",
             name="95 %",
+            makes_room=False,
         )
     ]
     if onboard is not None and has_values(onboard.latitude_deg):
@@ -73,31 +74,36 @@ def track_map(results: FlightResults) -> Plot | None:
         Told(x=scale * east, y=scale * north, value=data.time_s, title="flight time", is_time=True),
         Points(x=scale * east[known[:1]], y=scale * north[known[:1]], symbol="ring", role="ink"),
     ]
-    size = f", drawn {larger} times their size" if larger > 1 else ""
     panel = Panel(marks, Axis(f"east, {unit}"), Axis(f"north, {unit}"), is_map=True, unit_m=1.0 / scale)
     return Plot(
         "trajectory.map",
         "Track",
-        f"Smoothed track of the inertial unit. Ring: its start. Ellipses: 95 %{size}.",
+        f"Smoothed track of the inertial unit. Ring: its start. {told_ellipses('Ellipses: 95 %', larger, wider)}",
         "Map of the smoothed track in metres north and east of its start, with ellipses of 95 %.",
         one_panel(panel, 78.0),
         ("trajectory_track", "trajectory_onboard"),
     )
 
 
-def _rings(data: TrajectoryTrack, north: Floats, east: Floats, extent: float) -> tuple[tuple[Floats, ...], int]:
-    """Return ellipses along the way, and how many times their size they are."""
+def _rings(data: TrajectoryTrack, north: Floats, east: Floats, extent: float) -> tuple[tuple[Floats, ...], int, int]:
+    """Return ellipses along the way, and how many times their size they are.
+
+    Behind these: how many are wider than the map, and not drawn.
+    """
     rows = thin(len(data), ELLIPSES)
     sigmas = data.position_north_sigma_m[rows], data.position_east_sigma_m[rows]
     seen = np.isfinite(north[rows]) & np.isfinite(sigmas[0]) & np.isfinite(sigmas[1])
     rows = rows[seen]
+    half = ELLIPSE_95 * np.maximum(data.position_north_sigma_m[rows], data.position_east_sigma_m[rows])
+    wider = ~fits(extent, half)
+    rows, half = rows[~wider], half[~wider]
     if not len(rows):
-        return (), 1
+        return (), 1, int(wider.sum())
     sigmas = data.position_north_sigma_m[rows], data.position_east_sigma_m[rows]
-    larger = magnified(extent, np.maximum(*sigmas) * ELLIPSE_95)
+    larger = magnified(extent, half)
     middles = np.column_stack([north[rows], east[rows]])[:, None, :]
     drawn = middles + larger * outlines(*sigmas, np.zeros(len(rows)), ELLIPSE_95)
-    return tuple(drawn), larger
+    return tuple(drawn), larger, int(wider.sum())
 
 
 def attitude(results: FlightResults) -> Plot | None:

@@ -10,7 +10,7 @@ from groundstation.base.findings import SEVERITIES, Finding, place_time_ns
 from groundstation.base.signals import RAW_PREFIX, topics_of_kind
 from groundstation.base.units import NS_PER_S
 from groundstation.chapters.findings import findings
-from groundstation.chapters.markdown import markdown
+from groundstation.chapters.markdown import part_markdown
 from groundstation.results.arrays.flight import GapRows
 from groundstation.results.flight import FlightResults
 from groundstation.results.grouped_findings import grouped
@@ -31,10 +31,17 @@ def log(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Conta
     left: list[rrb.View] = [rrb.TextLogView(name="Findings and events in time", contents=paths, columns=columns)]
     if _gaps(recorder, results):
         left.append(rrb.TextLogView(name="Gaps in time", origin="/log/gaps", columns=columns))
-    recorder.document("log/by_gravity", markdown(findings(results)))
+    recorder.document("log/by_gravity", _by_gravity(results))
     gravest = document("Findings, most severe first", "log/by_gravity")
     column = rrb.Vertical(contents=left, row_shares=[2.0, 1.0][: len(left)])
     return rrb.Horizontal(contents=[column, gravest], name="Log")
+
+
+def _by_gravity(results: FlightResults) -> str:
+    """Return warnings and failures as a table; remarks stand in the list in time."""
+    section = findings(results)
+    beside = ["Remarks stand in the list beside."] if section.appendix else []
+    return "\n\n".join((part_markdown(section.parts[0], level=1), *beside))
 
 
 def _findings(recorder: Recorder, flight: Flight, results: FlightResults) -> None:

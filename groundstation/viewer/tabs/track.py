@@ -100,11 +100,11 @@ def _ellipses(recorder: Recorder, results: FlightResults, origin_deg: FloatArray
     corrected = corrected_position(results)
     if corrected is None:
         return ""
-    larger = corrected.larger(float(np.ptp(points, axis=0).max()))
+    rows, larger = corrected.drawn_on(float(np.ptp(points, axis=0).max()))
     north, east = plan_north_east_m(corrected.latitude_deg, corrected.longitude_deg, *origin_deg.tolist())
     middle = np.column_stack([east, -north]).astype(np.float32)
     half = larger * ELLIPSE_95 * np.column_stack([corrected.sigma_east_m, corrected.sigma_north_m]).astype(np.float32)
-    thin, rows = rr.Radius.ui_points(GRID_LINE), corrected.along()
+    thin = rr.Radius.ui_points(GRID_LINE)
     along = rr.Ellipses2D(
         half_sizes=half[rows], centers=middle[rows], colors=[colours.INS], line_radii=thin, draw_order=2.5
     )

@@ -10,6 +10,7 @@ from groundstation.base.records import Column
 from groundstation.systems.health import ardupilot
 from groundstation.systems.health.analysis import HEALTH
 from groundstation.systems.health.answer import AutopilotHealth
+from groundstation.systems.health.ending import ends_in_the_air
 from groundstation.systems.health.evidence import Event, Evidence, in_the_air
 from groundstation.systems.health.logged import low_pass, mean_over
 from groundstation.systems.health.settings import HealthSettings
@@ -317,6 +318,25 @@ def test_setpoints_count_in_modes_that_have_them() -> None:
     assert verdict(flight(attitude, table("raw.MODE", [0.0], ModeNum=5.0)), "tracking") == "warn"
 
 
+def test_an_attitude_that_is_lost_fails_and_comes_first() -> None:
+    """A copter that lies on its side for 3 s while level flight is asked for has lost control; 1 s is a gust."""
+    for length_s, expected in ((1.0, "warn"), (3.0, "fail")):
+        roll = np.where((TIME >= 50.0) & (50.0 + length_s > TIME), 70.0, 1.0)
+        attitude = table("raw.ATT", TIME, DesRoll=0.0, Roll=roll, DesPitch=0.0, Pitch=0.0)
+        made = flight(attitude, table("raw.MODE", [0.0], ModeNum=5.0))
+        assert verdict(made, "tracking") == expected
+    assert answer(made).sentence.startswith("Control of attitude lost 0:50-0:53")
+
+
+def test_a_log_that_ends_in_a_fall() -> None:
+    every = np.arange(0.0, 60.0, 0.1)
+    landed = table("raw.vehicle_land_detected", every, landed=np.where(every < 10.0, 1.0, 0.0))
+    for down, expected in ((13.2, ["log ends in the air, sinking at 13 m/s"]), (3.0, [])):
+        tables = {"ins": table("ins", every, velocity_down_mps=np.where(every > 57.0, down, 0.0)), landed.topic: landed}
+        made = Flight(tables, {}, 0, False, "made.bin")
+        assert [one.text for one in ends_in_the_air(made, in_the_air(made, KNOWN))] == expected
+
+
 def test_outputs_at_their_end() -> None:
     ends = {"SERVO1_FUNCTION": 33.0, "SERVO2_FUNCTION": 4.0, "SERVO2_MIN": 1000.0, "SERVO2_MAX": 2000.0}
     ends |= {"MOT_PWM_MIN": 1000.0, "MOT_PWM_MAX": 2000.0, "AHRS_EKF_TYPE": 3.0}
@@ -472,7 +492,10 @@ def test_a_log_of_todays_layout(tmp_path: object) -> None:
 
 
 REAL: Iterable[tuple[str, dict[str, str]]] = (
-    ("copter_3.6.7_log0041.BIN", {"gnss": "pass", "vibration": "pass", "innovations": "pass", "tracking": "warn"}),
+    (
+        "copter_3.6.7_log0041.BIN",
+        {"gnss": "pass", "vibration": "pass", "innovations": "pass", "tracking": "fail", "faults": "fail"},
+    ),
     ("erle_plane_4-12-2014_329.BIN", {"gnss": "pass", "innovations": "warn", "resets": "warn", "interference": "warn"}),
     ("plane_4.2.3_pilot0004.BIN", {"gnss": "fail", "innovations": "fail", "timing": "warn", "tracking": "not_logged"}),
 )

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from groundstation.base.ellipse import ELLIPSE_95
 from groundstation.base.failures import failures, gathered_failures
 from groundstation.chapters.parts import Front
 from groundstation.chapters.plots.flight import track_map
@@ -99,7 +100,10 @@ def test_the_track_has_ellipses_of_the_corrected_position() -> None:
     assert drawn is not None and "Ellipses: 95 % of the corrected position" in drawn.caption
     corrected = corrected_position(flight())
     assert corrected is not None and len(corrected.along()) == 8
-    assert corrected.larger(1e3) <= corrected.larger(1e6) / 100
+    assert corrected.drawn_on(1e3)[1] <= corrected.drawn_on(1e6)[1] / 100
+    wide = replace(corrected, sigma_north_m=np.geomspace(1.0, 1e7, len(corrected.time_s)))
+    rows, larger = wide.drawn_on(1e5)
+    assert 0 < len(rows) < 8 and larger * ELLIPSE_95 * wide.sigma_north_m[rows].max() <= 1e5
     without = track_map(example(inertial_result(**AIDED, figures=aided_figures(600.0))))
     assert without is not None and "Ellipses" not in without.caption
 

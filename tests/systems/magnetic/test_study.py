@@ -20,6 +20,7 @@ from groundstation.systems.magnetic.study.cases import (
     EXACT,
     INCOMPLETE,
     REFERENCE,
+    SWEEPS,
     SWEPT,
     WIDE,
     Setup,
@@ -239,6 +240,7 @@ def test_coverage_of_a_cell_is_that_of_its_accepted_flights() -> None:
     assert table["iron_d_ratio"][0] == pytest.approx(np.sqrt((0.5**2 + 2.5**2) / 2.0))
     assert (table["recommended_rms_deg"][0], table["recommended_worst_deg"][0]) == (pytest.approx(np.sqrt(0.1)), 0.4)
     assert np.isnan(table["iron_level"][1])
+    assert table.name not in {f"magnetic_{sweep.name}" for sweep in SWEEPS}
 
 
 def test_reasons_are_counted_without_their_numbers() -> None:
@@ -297,7 +299,7 @@ def test_study_has_its_tables_and_page(monkeypatch: pytest.MonkeyPatch) -> None:
         assert len(table) == len(sweep.points) * len(METHODS)
         assert set(table["flights"]) == {2}
     assert set(tables["magnetic_incomplete"]["figure"]) == set(incomplete)
-    cells = tables["magnetic_coverage"]
+    cells = tables["magnetic_cells"]
     assert cells["cell"][cells["family"] == "wide"].tolist() == list(WIDE)[:2]
     assert (tables["magnetic_verdicts"]["accepted"] <= tables["magnetic_verdicts"]["flights"]).all()
     for text in ("## Is what is left within the stated sigma?", "The claim is ", "grows as bank to the power"):

@@ -10,6 +10,7 @@ from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
 from groundstation.chapters.markdown import markdown
+from groundstation.chapters.parts import Rank
 from groundstation.pipeline.many_flights.fleet.rows import shares_of
 from groundstation.pipeline.one_flight.analyse import Answered, answers_of
 from groundstation.pipeline.one_flight.configuration import Configuration
@@ -21,6 +22,7 @@ from groundstation.simulation.processes import gauss_markov
 from groundstation.systems.known import Known
 from groundstation.systems.reference.analysis import REFERENCE
 from groundstation.systems.reference.answer import ReferenceResult
+from groundstation.systems.reference.chapter import reference as chapter
 from groundstation.systems.reference.columns import REFERENCE_COLUMNS
 from groundstation.systems.reference.errors import Errors, errors_of, turned_arm
 from groundstation.systems.reference.paths import path_rows
@@ -29,6 +31,7 @@ from groundstation.systems.reference.settings import ReferenceSettings
 from groundstation.systems.reference.statistics import share_of, spread_of
 from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight, Table
+from tests.report_example import example
 from tests.saved import load
 from tests.simulated_flights import FLIGHT_LEGS, quiet
 from tests.told import chapter_of
@@ -308,6 +311,8 @@ def test_another_place_datum_and_a_coarse_reference_are_told() -> None:
     answer = judged(replace(flight, tables={**flight.tables, "truth": replace(truth, columns=only_place)}))
     assert not answer.is_judge
     assert {row.state for row in answer.claims} == {"reference_too_coarse"}
+    told = chapter(replace(example(), answers={"reference": answer}))
+    assert told is not None and told.claim is not None and told.claim.rank is Rank.OTHER, "no page opens with it"
 
 
 def test_too_little_in_common_is_a_reason() -> None:

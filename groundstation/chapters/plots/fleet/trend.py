@@ -20,9 +20,12 @@ from groundstation.results.arrays.fleet import FleetTrend
 from groundstation.results.figures import numbers
 from groundstation.results.fleet import FleetResults
 
+DOTTED = "Dotted red: the limit that is stated, or from which the check warns; one far above is in the table alone. "
 SHADED = "Shaded: the 95 % intervals of the flights. "
 MOST_PANELS = 8
 PANEL_MM = 24.0
+LIMIT = "limit"
+FARTHEST_LIMIT = 5.0  # times the largest value
 HEADING, POSITIVE = "error_deg", "radial_error_rate_fit_nmiph"
 
 
@@ -38,6 +41,7 @@ def charts(fleet: FleetResults, quantity: str) -> Plot | None:
     shown = sorted(first[:MOST_PANELS])
     dates = date_axis(fleet.trend.start_utc[fleet.trend.quantity == quantity])
     places = _dates_of(fleet)
+    own_limits = fleet.trend.limit[fleet.trend.quantity == quantity]
     panels = [
         replace(
             told,
@@ -54,7 +58,7 @@ def charts(fleet: FleetResults, quantity: str) -> Plot | None:
         f"fleet.trend.{quantity}",
         f"Control chart of the {title_of(quantity)}",
         "Line: level, the median between changes, or the slope; dashed: control limits of single flights; red: "
-        "outside them. "
+        f"outside them. {DOTTED if np.isfinite(own_limits).any() else ''}"
         f"{SHADED if quantity == HEADING else ''}Numbered: the first flight of a new level.{more}",
         f"Control charts of the {title_of(quantity)} by aircraft over time.",
         tuple(Row((panel,), PANEL_MM, shares_x=panel is not panels[-1]) for panel in panels),
@@ -106,10 +110,27 @@ def chart(
     if is_outside.any():
         text = "outside the limits"
         marks.append(Dots(x=time[is_outside], y=value[is_outside], role="bad", name=text, emphasis="bold"))
-    known = finite(value, own.low, own.high)
+    limits = _limits(own, value)
+    marks += [Limit(value=limit, role="bad", dash="dotted", name=LIMIT if limit > 0.0 else "") for limit in limits]
+    known = finite(value, own.low, own.high, limits)
     is_log = quantity == POSITIVE and bool((known > 0.0).any())
     low, high = log_limits(known[known > 0.0]) if is_log else padded(float(known.min()), float(known.max()), 0.08, 0.05)
     return Panel(marks, x, Axis(QUANTITIES[quantity], "log" if is_log else "linear", low, high))
+
+
+def _limits(own: FleetTrend, value: Floats) -> Floats:
+    """Return the limits that stand in a chart, to either side where values are.
+
+    One that is far from every flight would flatten the chart, and is left to the table.
+    """
+    known = finite(own.limit)
+    if not len(known):
+        return np.zeros(0)
+    limit, largest = float(known[-1]), float(np.abs(value).max(initial=0.0))
+    if limit > FARTHEST_LIMIT * largest:
+        return np.zeros(0)
+    has_below = bool((value < 0.0).any()) and -float(value.min()) * FARTHEST_LIMIT >= limit
+    return np.array([limit, -limit] if has_below else [limit])
 
 
 def _in_order(places: Floats, rows: NDArray[np.intp]) -> tuple[Floats, NDArray[np.intp]]:

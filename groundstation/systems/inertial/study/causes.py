@@ -15,7 +15,7 @@ ALL, WITHIN = "all but broken", tuple(case.name for case in CASES if not case.br
 def study_causes(
     runs: int = 25, seed: int = 91, progress: Progress | None = None, *, minutes: float | None = None
 ) -> StudyResult:
-    """Fly and judge the families of docs/evidence/forecast.md, and three that break assumptions.
+    """Fly and judge the families of docs/evidence/forecast.md and three of broken assumptions.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ def coverage_table(cells: Iterable[Cell]) -> FigureData:
         *("table_level", "iron_level", "recommended_level", "recommended_rms_deg", "recommended_worst_deg"),
     )
     columns = {name: np.array([row[place] for row in rows]) for place, name in enumerate(names)}
-    return FigureData("magnetic_coverage", columns, dict.fromkeys(names[4:], 2))
+    return FigureData("magnetic_cells", columns, dict.fromkeys(names[4:], 2))
 
 
 def _row(outcomes: Sequence[JudgedAnswer]) -> tuple[float, ...]:

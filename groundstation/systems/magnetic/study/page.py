@@ -44,7 +44,7 @@ def page(tables: dict[str, FigureData], runs: int, seed: int, sweeps: Sequence[S
         ),
         _whole_flights(tables),
         _taxis(tables["magnetic_taxis"]),
-        _coverage(tables["magnetic_coverage"]),
+        _coverage(tables["magnetic_cells"]),
         _claim(tables),
         *(_sweep(sweep, tables) for sweep in sweeps),
         _incomplete(tables["magnetic_incomplete"]),
