@@ -192,7 +192,7 @@ def _climb_mps(table: Table) -> FloatArray:
 
 
 def _displaced(origin_deg: tuple[float, float], axis: int) -> Values:
-    """Return the function that gives the displacement from an origin, north (axis 0) or east (1), metres."""
+    """Return the function of the displacement from an origin, north (axis 0) or east, m."""
 
     def values(table: Table) -> FloatArray:
         return north_east_m(table.values("latitude_deg"), table.values("longitude_deg"), *origin_deg)[axis]
@@ -262,7 +262,10 @@ def on_grid(flight: Flight, table: Table, values: FloatArray | Values, size: int
 
 
 def _cells(flight: Flight, table: Table, size: int) -> Iterator[tuple[slice, Int64Array]]:
-    """Yield the rows of a table in parts, and the grid time nearest to each; no grid time is in two parts."""
+    """Yield the rows of a table in parts, and the grid time nearest to each row.
+
+    No grid time is in two parts.
+    """
     start = 0
     while size and start < len(table):
         end, kept = start, 0

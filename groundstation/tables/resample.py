@@ -124,7 +124,10 @@ def _interpolated(table: Table, name: str, at_ns: Int64Array, gap_ns: int) -> Co
 
 
 def _known_once(time_ns: Int64Array, values: FloatArray) -> tuple[Int64Array, FloatArray]:
-    """Return the times and values that are known, the first of one time; nothing is copied where that is all."""
+    """Return the times and values that are known, the first of one time.
+
+    Nothing is copied where that is all.
+    """
     known = np.isfinite(values)
     if not known.all():
         time_ns, values = time_ns[known], values[known]
