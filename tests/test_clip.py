@@ -274,6 +274,8 @@ def test_the_recording_stands_beside_it(whole: Path, tmp_path: Path) -> None:
     part = tmp_path / "part.mcap"
     code, text, err = groundstation("clip", str(whole), "--from", "60", "--to", "120", "-o", str(part), "--json")
     (told,) = json.loads(text)
+    size = f"recording {part.with_suffix('.rrd').stat().st_size / 1e6:.2f} MB)"
+    assert "s long, " in told["text"] and told["text"].endswith(size), told["text"]
     assert (code, err) == (0, "") and told["folder"] == str(part)
     contents = Contents(tmp_path / "part.rrd")
     assert contents.timelines == {"utc", "flight_time"}

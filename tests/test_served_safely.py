@@ -140,6 +140,7 @@ def test_the_page_leads_to_its_recording(page: str, sound: Path) -> None:
     assert (response.status, response.getheader("Location")) == (302, f"/?url=http://{page}/sound.rrd")
     assert asked(page, "GET", f"/?url=http://{page}/sound.rrd") == (200, None, b"the viewer")
     assert asked(page, "GET", "/sound.rrd") == (200, None, sound.read_bytes())
+    assert asked(page, "HEAD", "/sound.rrd") == (200, None, b""), "as curl -I asks"
 
 
 def test_a_recording_of_any_name_is_found(sound: Path, tmp_path: Path) -> None:

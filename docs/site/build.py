@@ -28,6 +28,7 @@ def _linked(text: str, folder: Path) -> str:
 def build() -> int:
     """Write the pages into a folder and let Sphinx make the site; the exit code is Sphinx's."""
     sys.path.insert(0, str(HERE))
+    from recording_page import page
     from reference import pages
 
     source = BUILD / "source"
@@ -36,7 +37,7 @@ def build() -> int:
     shutil.copy(HERE / "conf.py", source / "conf.py")
     for path in source.rglob("*.md"):
         path.write_text(_linked(path.read_text(encoding="utf-8"), path.parent), encoding="utf-8")
-    made = pages()
+    made = {**pages(), "ref_recording.md": page()}
     for name, text in made.items():
         (source / name).write_text(text, encoding="utf-8")
     (source / "index.md").write_text(_index((source / "README.md").read_text(encoding="utf-8"), made), encoding="utf-8")

@@ -65,10 +65,23 @@ def plain_name(delta: Delta) -> str:
         return delta.title
     first, *middle = delta.name.split(".")
     if not middle:
-        return words(first).capitalize()
+        return subject(first)
     what, unit = named_quantity(middle[-1].replace("confidence95", "95_%"))
-    inside = f" ({', '.join(words(part) for part in middle[:-1])})" if len(middle) > 1 else ""
-    return f"{words(first).capitalize()}: {what}{f', {unit}' if unit else ''}{inside}"
+    places = [words(part) for part in middle[:-1] if part != "rows"]
+    inside = f" ({', '.join(places)})" if places else ""
+    return f"{subject(first)}: {what}{f', {unit}' if unit else ''}{inside}"
+
+
+def subject(name: str) -> str:
+    """Return the name of an analysis in words.
+
+    Examples
+    --------
+    >>> subject("ins_ground"), subject("magnetic_ground"), subject("gnss")
+    ('INS ground', 'Magnetic ground', 'GNSS')
+    """
+    told = " ".join(word.upper() if word in ("ins", "gnss") else word for word in words(name).split())
+    return f"{told[:1].upper()}{told[1:]}"
 
 
 def opening(comparison: Comparison) -> list[Part]:
@@ -147,7 +160,7 @@ def findings(comparison: Comparison) -> Section | None:
         if (
             rows := [
                 *_finding_rows(findings),
-                *((Mark("unknown", "not assessed"), f"{one.analysis}: {one.reason}", "") for one in reasons),
+                *((Mark("unknown", "not assessed"), f"{subject(one.analysis)}: {one.reason}", "") for one in reasons),
             ]
         )
     ]

@@ -210,7 +210,7 @@ def comparison_text(found: "Comparison", *, everything: bool = False) -> str:
     The alignment of the clocks; answers, settings and findings that differ.
     """
     from groundstation.base.text_columns import columns
-    from groundstation.chapters.comparison import conclusion, plain_name
+    from groundstation.chapters.comparison import conclusion, plain_name, subject
 
     alignment = found.alignment
     when = "" if alignment.event == "utc" else f" (A at {alignment.a_s:.1f} s, B at {alignment.b_s:.1f} s)"
@@ -233,7 +233,7 @@ def comparison_text(found: "Comparison", *, everything: bool = False) -> str:
         ("B", found.findings_b, found.not_assessable_b),
     ):
         alone = [[finding.severity, printable(finding.text)] for finding in findings]
-        alone += [["not assessed", printable(f"{entry.analysis}: {entry.reason}")] for entry in reasons]
+        alone += [["not assessed", printable(f"{subject(entry.analysis)}: {entry.reason}")] for entry in reasons]
         if alone:
             parts.append(f"{letter} alone\n" + columns(alone))
     return "\n\n".join(parts)

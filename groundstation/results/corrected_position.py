@@ -30,7 +30,7 @@ class CorrectedPosition:
         return np.unique(np.linspace(0, len(self.time_s) - 1, SHOWN_ALONG).round().astype(np.int64))
 
     def drawn_on(self, side_m: float) -> tuple[NDArray[np.int64], int]:
-        """Return the rows along a track with an ellipse on a map of that side, and its enlargement.
+        """Return rows along a track with an ellipse on a map of that side, and its enlargement.
 
         Ellipses of 95 % that are wider than the map have no room on it.
         """

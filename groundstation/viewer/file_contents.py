@@ -1,7 +1,8 @@
 """Contents of a recording or layout file: who wrote it, timelines, entities, tabs."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from datetime import UTC as UTC_ZONE
 from datetime import datetime
 from importlib import metadata
@@ -16,7 +17,7 @@ from rerun.chunk import Chunk, RrdReader
 from groundstation.viewer.recorder import UTC
 
 MAGIC = b"RRF2"  # the file's first bytes; behind them a byte each of major, minor and patch version
-VIEWPORT, PROPERTIES = "/viewport", "/__properties"
+VIEWPORT, VIEWS, PROPERTIES = "/viewport", "/view/", "/__properties"
 NS_PER_S = 1e9
 
 
@@ -51,8 +52,8 @@ def facts_of_file(path: Path) -> dict[str, str]:
     for store in recordings[:1]:
         facts["recording"] = store.recording_id
         facts |= _facts_of(list(reader.stream(store=store)))
-    for store in layouts[:1]:
-        facts["tabs"] = ", ".join(tabs_of_layout(reader.stream(store=store))) or "none"
+    if layouts:
+        facts["tabs"] = ", ".join(tab.name for tab in layout_of(path)) or "none"
     return facts
 
 
@@ -81,12 +82,41 @@ def _told(timeline: str, value: int) -> str:
     return str(value) if timeline.endswith("number") else f"{value / NS_PER_S:.1f} s"
 
 
-def tabs_of_layout(chunks: Iterable[Chunk]) -> list[str]:
-    """Return the names of the tabs of a layout, in their order."""
-    rows = _latest(chunks)
+@dataclass(frozen=True)
+class ShownTab:
+    """Tab of a layout: its name, and the entity paths of each of its views by the view's name."""
+
+    name: str
+    views: tuple[tuple[str, tuple[str, ...]], ...]
+
+
+def layout_of(path: Path) -> tuple[ShownTab, ...]:
+    """Return the tabs of the layout in a file, in their order; none without a layout."""
+    reader = RrdReader(path)
+    return tuple(tab for store in reader.blueprints()[:1] for tab in _tabs(_latest(reader.stream(store=store))))
+
+
+def _tabs(rows: Mapping[str, dict[str, Any]]) -> Iterator[ShownTab]:
     root = f"/container/{_uuid(rows.get(VIEWPORT, {}).get('ViewportBlueprint:root_container'))}"
-    places = rows.get(root, {}).get("ContainerBlueprint:contents") or []
-    return [_name(rows.get("/" + place.lstrip("/"), {})) or "no name" for place in places]
+    for place in rows.get(root, {}).get("ContainerBlueprint:contents") or []:
+        own = rows.get(_path(place), {})
+        yield ShownTab(_name(own) or "no name", tuple(_views(rows, _path(place))))
+
+
+def _views(rows: Mapping[str, dict[str, Any]], path: str) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield the views of a container, or a view itself, with the entity paths that it shows."""
+    own = rows.get(path, {})
+    if path.startswith(VIEWS):
+        origin = (own.get("ViewBlueprint:space_origin") or ["/"])[0]
+        shown = rows.get(f"{path}/ViewContents", {}).get("ViewContents:query") or [f"{origin}/**"]
+        yield _name(own), tuple(one.removeprefix("+ ").replace("$origin", origin) for one in shown)
+    for place in own.get("ContainerBlueprint:contents") or []:
+        yield from _views(rows, _path(place))
+
+
+def _path(place: str) -> str:
+    """Return the path of a part of a layout: saved by the viewer it begins with a slash, else not."""
+    return "/" + place.lstrip("/")
 
 
 def _latest(chunks: Iterable[Chunk]) -> Mapping[str, dict[str, Any]]:

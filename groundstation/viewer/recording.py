@@ -23,7 +23,7 @@ from groundstation.results.answer import Answer
 from groundstation.results.flight import FlightResults
 from groundstation.systems.system import Systems
 from groundstation.tables.table import Flight
-from groundstation.viewer.held_stream import HeldStream
+from groundstation.viewer.held_stream import FLUSH_SECONDS, HeldStream
 from groundstation.viewer.inner import forget_closed, send_blueprint
 from groundstation.viewer.names import clean_text
 from groundstation.viewer.properties import send_properties
@@ -202,7 +202,7 @@ def send_layout(
     In its own, the panels are closed and time stands still.
     """
     blueprint = rrb.Blueprint(
-        rrb.Tabs(contents=tabs, active_tab=0),
+        rrb.Tabs(contents=tabs, active_tab=0 if tabs else None),
         rrb.TimePanel(state="collapsed", timeline=timeline, play_state="paused"),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
@@ -213,6 +213,7 @@ def send_layout(
         send_layout_content(stream, saved)
     else:
         send_blueprint(stream, blueprint)
+    stream.flush(timeout_sec=FLUSH_SECONDS)  # else data that are sent next may overtake a part of it
     return blueprint
 
 

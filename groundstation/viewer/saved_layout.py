@@ -82,6 +82,7 @@ def write_with_layout(recording: Path, content: bytes, target: Path) -> None:
         with rr.RecordingStream(store.application_id, recording_id=store.recording_id, send_properties=False) as stream:
             stream.save(target)
             send_layout_content(stream, content)
+            stream.flush(timeout_sec=FLUSH_SECONDS)
             stream.send_chunks(reader.stream(store=store))
             stream.flush(timeout_sec=FLUSH_SECONDS)
             stream.disconnect()

@@ -315,6 +315,12 @@ def test_findings_and_events_stand_in_the_log_with_severity_and_time(contents: C
     assert sum(batch.num_rows for batch in contents.batches["/log/events"]) == 2
 
 
+def test_a_finding_about_a_stretch_stands_at_its_begin(flight: Flight) -> None:
+    assert place_s("78.5 to 81.1 s", flight) == 78.5
+    assert place_s("from 7 to 9 s", flight) == 7.0
+    assert place_s("3 to 5 rows", flight) == 0.0
+
+
 def test_without_a_heading_the_overview_says_why_and_there_is_no_tab(tmp_path: Path, flight: Flight) -> None:
     write_recording(tmp_path / "a.rrd", flight, make_results(flight, with_heading=False))
     contents = Contents(tmp_path / "a.rrd")

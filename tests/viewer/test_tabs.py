@@ -122,6 +122,23 @@ def test_over_flight_time_values_are_as_told_and_broken_at_gaps(tmp_path: Path) 
     assert (contents.scalars("/a/plot/b/a_limits")[1] == 3.0).all()
 
 
+def test_a_line_of_one_moment_is_a_dot(tmp_path: Path) -> None:
+    curve = Curve(x=np.array([3.0]), y=np.array([0.5]), name="estimate")
+    told = Plot("a.plot", "A", "", "", one_panel(Panel([curve], Axis(scale="time"), Axis("b, m")), 40.0))
+    contents = logged(tmp_path, told)
+    (entity,) = entities(contents)
+    assert "SeriesPoints:markers" in contents.fixed[entity][0].schema.names
+    assert contents.scalars(entity)[1].tolist() == [[0.5]]
+
+
+def test_long_names_beside_a_chart_are_wrapped_and_not_cut(tmp_path: Path) -> None:
+    names = ["95 % of the smoothed solution, by its own sigma", "forward filter, at the end of the outage"]
+    marks = [Curve(x=np.arange(5.0), y=np.arange(5.0) + place, name=name) for place, name in enumerate(names)]
+    contents = logged(tmp_path, Plot("a.plot", "A", "", "", one_panel(Panel(marks, Axis("x"), Axis("y, m")), 40.0)))
+    (batch,) = contents.fixed["/a/plot/y/legend"]
+    assert [" ".join(label.split()) for label in batch.column("Points2D:labels").to_pylist()[0]] == names
+
+
 def test_states_are_one_lane_with_those_that_the_page_leaves_out(tmp_path: Path) -> None:
     state = np.array(["used", "odd", "used"])
     lanes = Lanes(start=np.arange(3.0), end=np.arange(3.0) + 1.0, state=state, order=("used",))

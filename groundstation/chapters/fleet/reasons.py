@@ -18,14 +18,17 @@ _NUMBER = re.compile(r"[-+−]?\d[\d.,:]*")
 
 
 class Reasons(NamedTuple):
-    """Remarks on flights by their ids, and the table of the reasons they refer to; None without any."""
+    """Remarks on flights by their ids, and the table of the reasons they refer to.
+
+    The table is None where they refer to none.
+    """
 
     remarks: Mapping[str, str]
     table: Grid | None
 
 
 def reasons_of(fleet: FleetResults) -> Reasons:
-    """Return why flights were rejected or failed, each reason once with the flights that have it.
+    """Return why flights were rejected or failed, each reason once with its flights.
 
     Reasons that differ in numbers alone are one; its text is that of the first flight.
     """

@@ -102,7 +102,7 @@ def _scale(north: Floats, east: Floats) -> tuple[float, str]:
 def _ellipses(
     corrected: CorrectedPosition, origin: tuple[float, float], side_m: float, scale: float
 ) -> tuple[tuple[Outlines, ...], str]:
-    """Return 95 % ellipses of the corrected position along the track, and their words in the caption."""
+    """Return 95 % ellipses of the corrected position along the track, and their caption."""
     rows, larger = corrected.drawn_on(side_m)
     north, east = plan_north_east_m(corrected.latitude_deg[rows], corrected.longitude_deg[rows], *origin)
     sigmas = corrected.sigma_north_m[rows], corrected.sigma_east_m[rows]

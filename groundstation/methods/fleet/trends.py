@@ -137,7 +137,7 @@ def _limits(limits: UnitLimits) -> dict[TrendQuantity, float]:
 
 
 def _limit_of_check(flights: FigureData, quantity: TrendQuantity, rows: NDArray[np.intp]) -> float | None:
-    """Return the value from which the check of a quantity warns, that of the last flight which has one."""
+    """Return the value from which the check of a quantity warns, by the last flight with one."""
     name = LIMIT_COLUMNS.get(quantity)
     values = flights[name][rows] if name is not None else np.zeros(0)
     known = values[np.isfinite(values)]

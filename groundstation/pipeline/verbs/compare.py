@@ -318,7 +318,9 @@ def _leaves(path: str, node: Any) -> Iterator[tuple[str, Value]]:
 
 
 def _findings(saved: SavedFlight) -> tuple[Finding, ...]:
-    found = [replace(finding, count=None) for finding in saved.results.findings]
+    told_as_reasons = ".not_assessable"
+    every = saved.results.findings
+    found = [replace(one, count=None) for one in every if not one.code.endswith(told_as_reasons)]
     return grouped(sorted(found, key=lambda finding: -SEVERITIES.index(finding.severity)))
 
 

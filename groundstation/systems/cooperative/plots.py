@@ -111,7 +111,7 @@ def _ellipses(data: CooperativeTracks, rows: Flags) -> Floats:
 
 
 def _drawn(plane: Floats, ellipses: Floats, rows: Mapping[str, Rows]) -> tuple[Mapping[str, Rows], int, int]:
-    """Return the rows whose ellipses have room on the map, their enlargement, and how many have none."""
+    """Return rows whose ellipses have room on the map, their enlargement, how many have none."""
     side = float(np.nanmax(np.nanmax(plane[:, :2], axis=0) - np.nanmin(plane[:, :2], axis=0)))
     half = np.hypot(*np.moveaxis(ellipses, 2, 0)).max(axis=1)
     kept = {name: mine[fits(side, half[mine])] for name, mine in rows.items()}

@@ -59,7 +59,7 @@ def headline(fleet: FleetResults) -> FleetSkill | None:
 
 
 def figures(fleet: FleetResults) -> tuple[KeyFigure, ...]:
-    """Return the RMS error of the shipped method on an aircraft; of several the lowest and the highest."""
+    """Return the RMS error of the shipped method on an aircraft, of several the ends."""
     row = headline(fleet)
     if row is None:
         return ()
@@ -72,7 +72,7 @@ def figures(fleet: FleetResults) -> tuple[KeyFigure, ...]:
 
 
 def by_aircraft(fleet: FleetResults, row: FleetSkill) -> dict[str, float]:
-    """Return the RMS error of a method at a horizon on each aircraft, mean squares merged by the starts."""
+    """Return the RMS error of a method at a horizon on each aircraft, merged by the starts."""
     table = fleet.skill_flights
     rows = (table.method == row.method) & (table.horizon_min == row.horizon_min) & np.isfinite(table.rms_m)
     owner, starts, squares = table.aircraft[rows], table.starts[rows], table.rms_m[rows] ** 2

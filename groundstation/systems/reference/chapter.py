@@ -81,7 +81,9 @@ def _claim(answer: ReferenceResult) -> Claim:
     judged = [row for row in answer.claims if row.state in ("too_sure", "too_careful", "consistent")]
     mark = Mark("warn", "Too sure") if sure else Mark("good", "Consistent") if judged else Mark("good", "Measured")
     sentences = [
-        f"{_name(row)}: {percent(row.share_inside95)} of the errors inside the 95 % claimed." for row in sure[:2]
+        f"{name[:1].upper()}{name[1:]}: {percent(row.share_inside95)} of the errors inside the 95 % claimed."
+        for row in sure[:2]
+        if (name := _name(row))
     ]
     headline = "; ".join(f"{label} {value}" for label, value, _remark in figures[:3]) or "nothing to compare"
     value, remark = (figures[0][1], f"{figures[0][0]}, RMS") if figures else ("", "")
