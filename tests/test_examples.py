@@ -7,7 +7,8 @@ import matplotlib as mpl
 import pandas as pd
 import pytest
 
-import groundstation
+from groundstation.pipeline.many_flights.runs.batch import run_many
+from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.verbs.synthesis import simulate_to
 from tests.readers.ulog_writer import UlogWriter
 
@@ -39,8 +40,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (made / "short.toml").write_text(SHORT_UNIT, encoding="utf-8")
     simulate_to(str(made / "short.toml"), made, form="ulog")
     (made / "flight.ulg").write_bytes((made / "short.ulg").read_bytes() + parameters())
-    opened = groundstation.open(made / "flight.csv")
-    opened.save(made / "out")
+    run_many([made / "flight.csv"], made / "out", Configuration(), jobs=1, only_results=True)
     return made
 
 

@@ -18,7 +18,9 @@ from groundstation.base.errors import NotAssessableError, UnknownNameError, Usag
 from groundstation.pipeline.answer_methods import AnswerMethods
 from groundstation.pipeline.api import OpenLog, SavedRun
 from groundstation.pipeline.fleet_frame import Fleet
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.notebook import OpenFlight
+from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.frames import Tabular, tables_of
@@ -330,6 +332,7 @@ def test_a_reference_judges_as_the_option_of_run_does(fleet: Fleet, tmp_path: Pa
     assert isinstance(judged, OpenLog) and judged.reference().to_frame("errors")["subject"].tolist()[0] == "gnss"
     again = judged.with_settings(heading={"taxi_speed_min_mps": 7.0})
     assert again.configuration.references == judged.configuration.references and again.flight is judged.flight
+    assert groundstation.open(SHORT, without="heading").configuration.without == ("heading",)
     with pytest.raises(UsageError, match="no such file"):
         groundstation.open(SHORT, reference=tmp_path / "none.csv")
     with pytest.raises(UsageError, match="settings for saved results"):
@@ -337,9 +340,9 @@ def test_a_reference_judges_as_the_option_of_run_does(fleet: Fleet, tmp_path: Pa
 
 
 @pytest.fixture(scope="module")
-def fleet(flight: OpenLog, tmp_path_factory: pytest.TempPathFactory) -> Fleet:
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> Fleet:
     out = tmp_path_factory.mktemp("fleet") / "out"
-    flight.save(out)
+    run_many([GOOD], out, Configuration(), jobs=1, only_results=True)
     return groundstation.open_fleet(out)
 
 

@@ -30,7 +30,7 @@ def open_flight(
     icd: AnyPath | Sequence[AnyPath] = (),
     thresholds: Settings | None = None,
     weather: Settings | None = None,
-    without: Sequence[str] = (),
+    without: str | Sequence[str] = (),
     reference: AnyPath | Sequence[AnyPath] = (),
     installation: AnyPath | None = None,
 ) -> "OpenFlight":
@@ -47,7 +47,7 @@ def open_flight(
         Layout of a log that no reader knows.
     icd : str, Path or several of them, optional
         What the words of a recording's buses mean: files, or names of shipped ICDs.
-    without : sequence of str
+    without : str or sequence of str
         Analyses to leave out.
     reference : str, Path or several of them, optional
         Files, or folders of files, of which the one of the log's time judges the answers, as ``run --reference``.
@@ -66,6 +66,7 @@ def open_flight(
     """
     where, layout = Path(path), None if profile is None else Path(profile)
     icds = tuple(str(one) for one in _several(icd))
+    left_out = [without] if isinstance(without, str) else without
     references = tuple(Path(one) for one in _several(reference))
     given = {"config": config, "aircraft": aircraft, "site": site, "intervals": intervals, "thresholds": thresholds}
     given["weather"] = weather
@@ -74,11 +75,11 @@ def open_flight(
         if not where.exists():
             raise UsageError(str(where), "no such file or folder")
         if where.is_dir():
-            told = (layout, icds, without, references, installation)
+            told = (layout, icds, left_out, references, installation)
             if any(told) or any(value is not None for value in given.values()):
                 raise UsageError(str(where), "settings for saved results", next_step="open it, then with_settings()")
             return SavedRun(_flight_folder(where))
-        configuration = load_configuration(profile=layout, icds=icds, without=without, **files)
+        configuration = load_configuration(profile=layout, icds=icds, without=left_out, **files)
         configuration = installed_as(configuration, None if installation is None else Path(installation))
         configuration = judged_by(configuration, references, is_one_log=True)
         return OpenLog(Conversion(open_log(where, layout, icds), configuration.references), configuration)

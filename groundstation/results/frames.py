@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache
+from html import escape
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -104,9 +105,10 @@ class Tabular(Brief):
 
         shown = {part.name: getattr(self, part.name) for part in fields(cast(Any, self))}
         plain = {name: value for name, value in shown.items() if value is None or isinstance(value, str | int | float)}
+        told = "" if plain else f"<pre>{escape(repr(self))}</pre>"
         if names := self.table_names():
             plain["table_names()"] = ", ".join(names)
-        return pd.Series(plain, dtype=object).to_frame().to_html(header=False)
+        return told + pd.Series(plain, dtype=object).to_frame().to_html(header=False)
 
 
 class RowsInside(NamedTuple):

@@ -64,7 +64,15 @@ class Latencies(Answer, Delays):
     settings: dict[str, Any] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
 
+    def __repr__(self) -> str:
+        told = (f"{one.other} {one.quantity} {_told(one.latency_s)}" for one in self.rows)
+        return f"<Latencies {'; '.join(told) or 'none'}>"
+
     def observed(self, reference: str, other: str) -> Latency | None:
         """The row of a pair where it is observed, else None."""
         found = (row for row in self.rows if (row.reference, row.other) == (reference, other))
         return next((row for row in found if row.state == "observed"), None)
+
+
+def _told(latency_s: float | None) -> str:
+    return "not observable" if latency_s is None else f"{latency_s:+.3f} s"
