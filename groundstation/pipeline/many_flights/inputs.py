@@ -73,7 +73,10 @@ def is_session(folder: Path) -> bool:
 
 
 def no_log(folder: Path, *, takes_flights: bool = False) -> UsageError:
-    """Error for a folder that is not the log that a verb takes; some verbs take the folder of a flight too."""
+    """Error for a folder that is not the log that a verb takes.
+
+    Some verbs take the folder of a flight too.
+    """
     if is_session(folder):
         return UsageError(str(folder), "a session of several aircraft", "a log", "manifest.json in it names its logs")
     expected = "a log or the folder of one flight" if takes_flights else "a log"
