@@ -445,7 +445,7 @@ def test_the_verb_prints_a_table_or_json_and_writes_nothing(folders: dict[str, P
     arguments = ["compare", str(folders["good"]), str(folders["later"])]
     code, text, err = groundstation(*arguments)
     assert (code, err) == (0, "")
-    assert re.search(r"^heading\.error_deg +\S+ +\S+ +\S+ +\S+ +(within|beyond)$", text, re.MULTILINE)
+    assert re.search(r"^Heading: error, ° +\S+ +\S+ +\S+ +\S+ +(within|beyond)$", text, re.MULTILINE)
     assert f"clock of B -{LATER_S:.1f}"[:15] in text
     code, text, _ = groundstation(*arguments, "--json")
     document = json.loads(text)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
+STEPS_AT_ONCE = 1 << 18  # working arrays do not grow with a log
 
 
 def wrap_360(angle_deg: ArrayLike) -> FloatArray:
@@ -47,10 +48,18 @@ def unwrap(heading_deg: ArrayLike) -> FloatArray:
     """
     heading = np.asarray(heading_deg, dtype=np.float64)
     out = heading.copy()
-    known = np.flatnonzero(np.isfinite(heading))
-    if known.size > 1:
-        steps = wrap_180(np.diff(heading[known]))
-        out[known[1:]] = heading[known[0]] + np.cumsum(steps)
+    known = np.isfinite(heading)
+    if not known.all():
+        out[known] = unwrap(heading[known]) if known.any() else np.nan
+        return out
+    turned = 0.0  # since the first
+    for start in range(1, len(heading), STEPS_AT_ONCE):
+        part = slice(start, start + STEPS_AT_ONCE)
+        steps = np.asarray(wrap_180(np.diff(heading[start - 1 : start + STEPS_AT_ONCE])))
+        steps[0] += turned
+        np.cumsum(steps, out=steps)
+        turned = steps[-1]
+        out[part] = heading[0] + steps
     return out
 
 

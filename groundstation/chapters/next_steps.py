@@ -6,6 +6,7 @@ them stands here.
 
 from collections.abc import Iterator
 
+from groundstation.base.words import listed
 from groundstation.chapters.chapter import Advice, Chapters, Remedies
 from groundstation.chapters.parts import Facts, Section
 from groundstation.results.flight import FlightResults
@@ -30,21 +31,21 @@ def next_steps(results: FlightResults, chapters: Chapters) -> Section | None:
     """Return the chapter in at most three lines; None where nothing is left to advise."""
     lines: dict[str, dict[str, list[str]]] = {line: {} for line in LINES}
     for line, text, purpose, _ in _advice(results, chapters):
-        texts = lines[line].setdefault(purpose, [])
-        if text not in texts and sum(map(len, lines[line].values())) < MOST_OF_A_LINE:
-            texts.append(text)
-    pairs = [(line, _told(lines[line]), "") for line in LINES if any(lines[line].values())]
+        texts = lines[line]
+        if text in texts and purpose not in texts[text]:
+            texts[text].append(purpose)
+        elif len(texts) < MOST_OF_A_LINE:
+            texts.setdefault(text, [purpose])
+    pairs = [(line, _told(texts), "") for line, texts in lines.items() if texts]
     return Section("next", TITLE, LEAD, (Facts("", pairs),)) if pairs else None
 
 
 def _told(texts: dict[str, list[str]]) -> str:
-    """Return what is wanted, grouped by its purpose."""
-    each = (
-        f"for the {purpose}: {', '.join(some)}" if purpose else ", ".join(some)
-        for purpose, some in texts.items()
-        if some
-    )
-    told = "; ".join(each)
+    """Return what is wanted, each once, grouped by its purposes; what is for all has none."""
+    groups: dict[str, list[str]] = {}
+    for text, purposes in texts.items():
+        groups.setdefault("" if "" in purposes else listed([f"the {one}" for one in purposes]), []).append(text)
+    told = "; ".join(f"for {who}: {', '.join(some)}" if who else ", ".join(some) for who, some in groups.items())
     return f"{told[:1].upper()}{told[1:]}."
 
 

@@ -23,6 +23,7 @@ from groundstation.tables.wheels import contact_of
 MAX_OVERVIEW_ROWS = 4000
 GAP_PERIODS = 5.0
 LARGEST_QUIET_GAP_S = 3.0
+ROWS_AT_ONCE = 1 << 18  # working arrays do not grow with a log
 NEAR_NS = 1_000_000_000  # a value this near in time stands for a row that lacks it
 # Also drawn where a topic of the kind has it: name, kind, and the columns in whose place it stands when they are empty.
 ALSO = (
@@ -156,7 +157,12 @@ def _track(table: Table) -> NDArray[np.float64]:
     if not table.has("velocity_north_mps", "velocity_east_mps"):
         return table.values("track_deg")
     north, east = table.values("velocity_north_mps"), table.values("velocity_east_mps")
-    return np.where(np.hypot(north, east) > 1.0, direction_of(north, east), np.nan)
+    track = np.empty(len(table))
+    for start in range(0, len(table), ROWS_AT_ONCE):
+        rows = slice(start, start + ROWS_AT_ONCE)
+        is_moving = np.hypot(north[rows], east[rows]) > 1.0
+        track[rows] = np.where(is_moving, direction_of(north[rows], east[rows]), np.nan)
+    return track
 
 
 def _nearest_heading(
@@ -169,10 +175,11 @@ def _nearest_heading(
 
 def _nearest(times_ns: Int64Array, values: NDArray[np.float64], wanted_ns: Int64Array) -> NDArray[np.float64]:
     """The known value nearest in time to each wanted time, NaN where none is near."""
-    known = np.flatnonzero(np.isfinite(values))
-    if not known.size:
+    known = np.isfinite(values)
+    if not known.any():
         return np.full(len(wanted_ns), np.nan)
-    times_ns, values = times_ns[known], values[known]
+    if not known.all():
+        times_ns, values = times_ns[known], values[known]
     right = np.clip(np.searchsorted(times_ns, wanted_ns), 0, len(times_ns) - 1)
     left = np.maximum(right - 1, 0)
     nearest = np.where(np.abs(wanted_ns - times_ns[left]) < np.abs(times_ns[right] - wanted_ns), left, right)

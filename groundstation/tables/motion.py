@@ -1,5 +1,6 @@
 """Motion of a flight on a coarse, even grid of times, for the ground detector and phases."""
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,7 +8,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, unwrap
 from groundstation.base.geodesy import north_east_m
-from groundstation.base.records import BoolArray
+from groundstation.base.records import BoolArray, Int64Array
 from groundstation.tables.sources import sources_of_kind
 from groundstation.tables.table import Flight, Table
 
@@ -16,6 +17,8 @@ LARGEST_GAP_S = 2.5  # bridges 1 Hz logs with one lost second, nothing more
 LONGEST_GRID = 2_000_000  # 4.6 days, 0.6 GB: a clock that jumps must not fill the memory
 FEWEST_SATELLITES = 4
 FROZEN_S, FROZEN_SPEED_MPS = 60.0, 20.0
+ROWS_AT_ONCE = 1 << 18  # of a table: working arrays do not grow with a log
+Values = Callable[[Table], FloatArray]  # of the rows of a part of a table
 
 
 @dataclass(frozen=True)
@@ -85,9 +88,8 @@ def motion_of(flight: Flight) -> Motion:
     """
     size = grid_size(flight)
     ins, gnss = first_of_kind(flight, "ins"), first_of_kind(flight, "gnss")
-    usable = _usable_fixes(gnss)
-    speed = on_grid(flight, gnss, np.where(usable, horizontal_speed_mps(gnss), np.nan), size)
-    speed = np.where(np.isfinite(speed), speed, on_grid(flight, ins, horizontal_speed_mps(ins), size))
+    speed = on_grid(flight, gnss, _usable_speed_mps, size)
+    speed = np.where(np.isfinite(speed), speed, on_grid(flight, ins, horizontal_speed_mps, size))
     true_heading, magnetic = ins.values("true_heading_deg"), ins.values("magnetic_heading_deg")
     heading = true_heading if np.isfinite(true_heading).any() else magnetic
     north, east = _positions(flight, gnss, ins, size)
@@ -99,9 +101,7 @@ def motion_of(flight: Flight) -> Motion:
         on_grid(flight, ins, unwrap(heading), size),
         np.array([_altitude(flight, table, speed) for table in (ins, gnss)]),
         _altitude(flight, first_of_kind(flight, "baro"), speed),
-        np.array([on_grid(flight, table, -table.values("velocity_down_mps"), size) for table in (ins, gnss)]).reshape(
-            2, size
-        ),
+        np.array([on_grid(flight, table, _climb_mps, size) for table in (ins, gnss)]).reshape(2, size),
         north,
         east,
         np.concatenate([[0.0], np.cumsum(0.5 * (moving[1:] + moving[:-1]))])[:size] / RATE_HZ,
@@ -183,14 +183,32 @@ def _usable_fixes(gnss: Table) -> BoolArray:
     return np.asarray(~is_doubtful)
 
 
+def _usable_speed_mps(gnss: Table) -> FloatArray:
+    return np.where(_usable_fixes(gnss), horizontal_speed_mps(gnss), np.nan)
+
+
+def _climb_mps(table: Table) -> FloatArray:
+    return -table.values("velocity_down_mps")
+
+
+def _displaced(origin_deg: tuple[float, float], axis: int) -> Values:
+    """Return the function of the displacement from an origin, north (axis 0) or east, m."""
+
+    def values(table: Table) -> FloatArray:
+        return north_east_m(table.values("latitude_deg"), table.values("longitude_deg"), *origin_deg)[axis]
+
+    return values
+
+
 def _positions(flight: Flight, gnss: Table, ins: Table, size: int) -> tuple[FloatArray, FloatArray]:
     for table in (gnss, ins):
         known = table.valid("latitude_deg", "longitude_deg")
         if known.any():
             latitude, longitude = table.values("latitude_deg"), table.values("longitude_deg")
             first = int(np.argmax(known))
-            north, east = north_east_m(latitude, longitude, float(latitude[first]), float(longitude[first]))
-            return on_grid(flight, table, north, size), on_grid(flight, table, east, size)
+            origin = float(latitude[first]), float(longitude[first])
+            north, east = (on_grid(flight, table, _displaced(origin, axis), size) for axis in (0, 1))
+            return north, east
     unknown = np.full(size, np.nan)
     return unknown, unknown
 
@@ -216,22 +234,45 @@ def _is_frozen(altitude_m: FloatArray, speed_mps: FloatArray) -> BoolArray:
     return frozen
 
 
-def on_grid(flight: Flight, table: Table, values: FloatArray, size: int) -> FloatArray:
+def on_grid(flight: Flight, table: Table, values: FloatArray | Values, size: int) -> FloatArray:
     """Average the samples nearest to each grid time.
 
-    Gaps of at most LARGEST_GAP_S are filled by straight lines.
+    Gaps of at most LARGEST_GAP_S are filled by straight lines. ``values``, shape (n,), or the function that gives them
+    of a part of the table.
     """
-    known = np.isfinite(values)
-    out = np.full(size, np.nan)
-    if size == 0 or not known.any():
-        return out
-    cell = np.minimum(np.rint(flight.seconds(table.time_ns[known]) * RATE_HZ).astype(np.int64), size - 1)
-    count = np.bincount(cell, minlength=size)
+    count, total = np.zeros(size, dtype=np.int64), np.zeros(size)
+    for rows, cell in _cells(flight, table, size):
+        part = values[rows] if isinstance(values, np.ndarray) else values(table.take(rows))
+        known = np.isfinite(part)
+        if not known.all():
+            cell, part = cell[known], part[known]
+        if len(cell):
+            first, end = int(cell[0]), int(cell[-1]) + 1
+            count[first:end] += np.bincount(cell - first)
+            total[first:end] += np.bincount(cell - first, weights=part)
     at = np.flatnonzero(count)
-    means = np.bincount(cell, weights=values[known], minlength=size)[at] / count[at]
-    out = np.interp(np.arange(size), at, means, left=np.nan, right=np.nan)
+    if not len(at):
+        return np.full(size, np.nan)
+    out = np.interp(np.arange(size), at, total[at] / count[at], left=np.nan, right=np.nan)
     wide = np.flatnonzero(np.diff(at) > LARGEST_GAP_S * RATE_HZ)
     inside = np.zeros(size + 1, dtype=np.int64)
     inside[at[wide] + 1] += 1
     inside[at[wide + 1]] -= 1
     return np.where(np.cumsum(inside[:-1]) > 0, np.nan, out)
+
+
+def _cells(flight: Flight, table: Table, size: int) -> Iterator[tuple[slice, Int64Array]]:
+    """Yield the rows of a table in parts, and the grid time nearest to each row.
+
+    No grid time is in two parts.
+    """
+    start = 0
+    while size and start < len(table):
+        end, kept = start, 0
+        while not kept:  # all of a part at one grid time: more of them
+            end += ROWS_AT_ONCE
+            cell = np.rint(flight.seconds(table.time_ns[start:end]) * RATE_HZ).astype(np.int64)
+            np.minimum(cell, size - 1, out=cell)
+            kept = len(cell) if end >= len(table) else int(np.searchsorted(cell, cell[-1]))
+        yield slice(start, start + kept), cell[:kept]
+        start += kept

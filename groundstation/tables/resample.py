@@ -104,17 +104,15 @@ def _as_it_is(number: FloatArray) -> FloatArray:
 
 def _interpolated(table: Table, name: str, at_ns: Int64Array, gap_ns: int) -> Column:
     values = table.values(name)
-    known = np.flatnonzero(np.isfinite(values))
-    known = known[np.diff(table.time_ns[known], prepend=np.iinfo(np.int64).min // 2) > 0]  # the first of one time
-    if not known.size:
+    time_ns, values = _known_once(table.time_ns, values)
+    if not len(values):
         return Column(np.full(len(at_ns), np.nan), np.zeros(len(at_ns), dtype=bool))
-    time_ns, values = table.time_ns[known], values[known]
     after = np.searchsorted(time_ns, at_ns, side="left")
-    right = np.minimum(after, len(known) - 1)
+    right = np.minimum(after, len(values) - 1)
     is_sample = time_ns[right] == at_ns
     left = np.where(is_sample, right, np.maximum(after - 1, 0))
     step_ns = time_ns[right] - time_ns[left]
-    is_between = (after > 0) & (after < len(known)) & (step_ns <= gap_ns)
+    is_between = (after > 0) & (after < len(values)) & (step_ns <= gap_ns)
     share = (at_ns - time_ns[left]) / np.maximum(step_ns, 1)
     difference = values[right] - values[left]
     wrap = _wrap_of(table, name) or _as_it_is
@@ -123,6 +121,19 @@ def _interpolated(table: Table, name: str, at_ns: Int64Array, gap_ns: int) -> Co
     joined = wrap(values[left] + share * difference)
     present = is_sample | is_between
     return Column(np.where(present, joined, np.nan), present)
+
+
+def _known_once(time_ns: Int64Array, values: FloatArray) -> tuple[Int64Array, FloatArray]:
+    """Return the times and values that are known, the first of one time.
+
+    Nothing is copied where that is all.
+    """
+    known = np.isfinite(values)
+    if not known.all():
+        time_ns, values = time_ns[known], values[known]
+    is_first = np.ones(len(time_ns), dtype=bool)
+    np.greater(time_ns[1:], time_ns[:-1], out=is_first[1:])
+    return (time_ns, values) if is_first.all() else (time_ns[is_first], values[is_first])
 
 
 def _held(table: Table, name: str, at_ns: Int64Array, gap_ns: int, choice: Choice) -> Column:

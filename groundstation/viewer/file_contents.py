@@ -58,7 +58,7 @@ def facts_of_file(path: Path) -> dict[str, str]:
 
 
 def _facts_of(chunks: Iterable[Chunk]) -> dict[str, str]:
-    """Return timelines with their spans, and the number of entities by the first part of their paths."""
+    """Return timelines with their spans, and counts of entities by first part of the path."""
     spans: dict[str, list[Any]] = {}
     entities: set[str] = set()
     for chunk in chunks:
@@ -115,7 +115,7 @@ def _views(rows: Mapping[str, dict[str, Any]], path: str) -> Iterator[tuple[str,
 
 
 def _path(place: str) -> str:
-    """Return the path of a part of a layout: saved by the viewer it begins with a slash, else not."""
+    """Return the path of a part of a layout; only the viewer saves it with a slash in front."""
     return "/" + place.lstrip("/")
 
 

@@ -75,7 +75,10 @@ def log_aircraft(recorder: FleetRecorder, fleet: FleetResults, aircraft: Charted
 
 
 def _alone(told: Panel) -> Panel:
-    """Return the chart of an aircraft on a page of its own: without a level, the axis holds its intervals too."""
+    """Return the chart of an aircraft for its own page.
+
+    Without a level, the axis holds its intervals too.
+    """
     has_level = any(isinstance(mark, Curve) for mark in told.marks)
     return replace(told, legend="", y=told.y if has_level else replace(told.y, low=None, high=None))
 

@@ -29,7 +29,10 @@ LINKS = (
 
 
 def aircraft_text(fleet: FleetResults, entities: Mapping[str, str], systems: Systems) -> str:
-    """Return what is told by aircraft, each a link to its entity; empty where there is no table."""
+    """Return what is told by aircraft, each a link to its entity.
+
+    Empty where there is no table.
+    """
     names = {aircraft_name(name): f"recording://{entity}" for name, entity in entities.items() if name}
     links = {name: link for name, link in names.items() if link.isascii()}
     sections = list(_of_panel("aircraft", fleet, systems))

@@ -30,7 +30,7 @@ class HeldStream:
 
     @property
     def stream(self) -> rr.RecordingStream:
-        """This object, for a recorder: it has the methods of a stream that tabs use."""
+        """The stream for a recorder: this object, with the methods of a stream that tabs use."""
         return cast("rr.RecordingStream", self)
 
     def log(self, *args: Any, **options: Any) -> None:

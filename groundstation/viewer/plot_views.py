@@ -306,7 +306,10 @@ def _title(title: str, named: Sequence[Line]) -> str:
 
 
 def _title_beside(title: str, named: Sequence[Line]) -> str:
-    """Return the title of a panel that leaves its legend to one beside it: with the colours if there are several."""
+    """Return the title of a panel that leaves its legend to one beside it.
+
+    It says the colours if there are several.
+    """
     is_one = len({line.colour for line in named}) < 2
     return title if is_one else _title(title, named) or title
 

@@ -163,9 +163,9 @@ def _log(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Cont
 def send_tabs(
     stream: rr.RecordingStream, held: HeldStream, tabs: Iterable[NamedTab], layout: bytes = b""
 ) -> rrb.Blueprint:
-    """Let tabs log in their order, send the layout, then what they logged; returns their layout.
+    """Let tabs log in their order, send the layout, then what they logged.
 
-    A saved ``layout`` is sent in its place.
+    Returns their layout. A saved ``layout`` is sent in its place.
     """
     shown = [held.attempt("tab", name, tab) for name, tab in tabs]
     own = send_layout(stream, [tab for tab in shown if tab is not None], saved=layout)

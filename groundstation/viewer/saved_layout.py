@@ -1,4 +1,4 @@
-"""Layout saved in the viewer (a blueprint, .rbl): read, checked, and put in place of that of a recording.
+"""Layout saved in the viewer (a blueprint, .rbl), in place of that of a recording.
 
 It binds to an application id, which is another one for each flight: here it gets that of the recording. Timelines and
 entity paths are the same for all flights, so that a layout saved from one serves others.

@@ -392,6 +392,17 @@ def test_a_log_without_a_compass_is_not_asked_for_a_magnetometer(field: str, is_
     assert ("magnetometer" in str(section)) == is_asked
 
 
+def test_advice_for_two_answers_is_told_once() -> None:
+    missing = tuple(NotAssessable(name, "GNSS never had a fix") for name in ("heading", "trajectory"))
+    section = next_steps(example(not_assessable=missing))
+    assert section is not None
+    (part,) = section.parts
+    assert isinstance(part, Facts) and [label for label, _, _ in part.pairs] == ["Check"]
+    assert part.pairs[0][1] == (
+        "For the heading correction and the best trajectory: the GNSS antenna, its cable and its sky."
+    )
+
+
 def test_provenance_names_log_and_files() -> None:
     section = provenance(example(None))
     files = facts(section.parts, "Source and files")

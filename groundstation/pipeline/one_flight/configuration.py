@@ -120,7 +120,7 @@ NO_REFERENCES = References()
 
 @dataclass(frozen=True)
 class SavedLayout:
-    """Layout saved in the viewer, which recordings get in place of their own: name of its file, and packed content."""
+    """Layout saved in the viewer, for recordings: name of its file, and packed content."""
 
     name: str
     packed: bytes = field(repr=False)

@@ -71,7 +71,9 @@ class Description:
 
 
 def describe(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()) -> Description:
-    """Describe a recorded log, a groundstation MCAP or a recording; ``icds`` name the words of its buses.
+    """Describe a recorded log, a groundstation MCAP or a recording.
+
+    ``icds`` name the words of its buses.
 
     Raises
     ------

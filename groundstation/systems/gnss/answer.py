@@ -135,12 +135,14 @@ class VelocityAgainstPosition:
     """Velocity against differenced position.
 
     ``left_rms_mps`` is what the delay does not explain. ``lag_s`` positive: the velocity is later than the position
-    by so much; None where the motion does not tell.
+    by so much; None where the motion does not tell. ``lasting_rms_mps`` is the RMS of means over ten seconds: scatter
+    of the position from fix to fix averages out of it; None without such a stretch.
     """
 
     seconds: float
     difference_rms_mps: float
     left_rms_mps: float
+    lasting_rms_mps: float | None
     claimed_mps: float | None
     lag_s: float | None
     lag_sigma_s: float | None

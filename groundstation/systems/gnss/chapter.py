@@ -195,6 +195,10 @@ def _motion(one: GnssReceiver, answer: GnssReception) -> list[Part | None]:
         spread = number(motion.lag_sigma_s, 3, "s")
         pairs.append(("Velocity later than position by", number(motion.lag_s, 3, "s", signed=True), f"± {spread}"))
         pairs.append(("Left without that delay, RMS", number(motion.left_rms_mps, 3, "m/s"), ""))
+    if motion.lasting_rms_mps is not None:
+        pairs.append(
+            ("As means over 10 s, RMS", number(motion.lasting_rms_mps, 3, "m/s"), "without noise of the fixes")
+        )
     return [Facts(f"Velocity against position{_of(one, answer)}", pairs), Figure("gnss.steps", of=one.topic)]
 
 

@@ -179,8 +179,9 @@ def _claims(one: GnssReceiver, settings: GnssSettings) -> list[Judged]:
 
 def _motion(one: GnssReceiver, settings: GnssSettings) -> list[Judged]:
     found = []
-    if one.motion is not None and one.motion.left_rms_mps > settings.velocity_apart_mps:
-        text = f"velocity and position tell different motions: they differ by {one.motion.left_rms_mps:.1f} m/s RMS"
+    apart_mps = None if one.motion is None else one.motion.lasting_rms_mps
+    if apart_mps is not None and apart_mps > settings.velocity_apart_mps:
+        text = f"velocity and position tell different motions: they differ by {apart_mps:.1f} m/s RMS over 10 s"
         found.append(Judged("warn", text, "velocity_apart", one.topic))
     if one.jumps_found:
         largest = max(one.jumps, key=lambda jump: jump.size_m)

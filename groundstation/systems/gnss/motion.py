@@ -13,6 +13,7 @@ from groundstation.systems.gnss.spells import known
 
 LEAST_STEPS = 10
 MOST_JUMPS = 20  # that the answer lists, the largest; all are counted
+LASTING_S = 10.0  # over which a velocity and places that tell different motions part
 MAD_TO_SIGMA = 1.4826
 ALONG_ONLY = 0.2  # of its part along the motion: a smaller part across is a shift in time
 FAST_MPS = 5.0  # slower, a step along the motion is as likely one of the place
@@ -70,7 +71,7 @@ def _motion(
     difference = beyond_m[usable] / step_s[usable, None]
     seconds = float(step_s[usable].sum())
     size = np.hypot(difference[:, 0], difference[:, 1])
-    kept = size <= ROBUST_SIGMAS * max(MAD_TO_SIGMA * float(np.median(size)), 1e-6)
+    kept = _is_usual(size)
     rms = float(np.sqrt(np.mean(size[kept] ** 2)))
     acceleration = (np.diff(one.velocity_mps[:, :2], axis=0) / step_s[:, None])[usable]
     kept &= np.isfinite(acceleration).all(axis=1)
@@ -83,10 +84,41 @@ def _motion(
         seconds,
         rms,
         float(np.sqrt(np.mean(np.sum(left**2, axis=1)))) if len(left) else rms,
+        _lasting_mps(beyond_m, step_s, usable),
         float(np.median(claimed)) if claimed.size else None,
         lag_s if is_known else None,
         sigma_s if is_known else None,
     )
+
+
+def _lasting_mps(beyond_m: FloatArray, step_s: FloatArray, usable: BoolArray) -> float | None:
+    """Return the RMS of the difference in velocity as means over ten seconds.
+
+    None without a stretch so long.
+
+    White noise of the position, ``s`` in each of two axes, leaves ``2 s / LASTING_S`` of it whatever the rate of fixes,
+    where from fix to fix it is ``2 s`` times the rate.
+    """
+    starts = np.flatnonzero(usable & ~np.append(False, usable[:-1]))
+    ends = np.flatnonzero(usable & ~np.append(usable[1:], False)) + 1
+    means = []
+    for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
+        passed_s = np.concatenate([[0.0], np.cumsum(step_s[start:end])])
+        moved_m = np.vstack([np.zeros((1, 2)), np.cumsum(beyond_m[start:end], axis=0)])
+        count = int(passed_s[-1] // LASTING_S)
+        if count:
+            rows = np.searchsorted(passed_s, LASTING_S * np.arange(count + 1))
+            rows = np.unique(np.minimum(rows, len(passed_s) - 1))
+            means.append(np.diff(moved_m[rows], axis=0) / np.diff(passed_s[rows])[:, None])
+    if not means:
+        return None
+    size = np.linalg.norm(np.vstack(means), axis=1)
+    return float(np.sqrt(np.mean(size[_is_usual(size)] ** 2)))
+
+
+def _is_usual(size: FloatArray) -> BoolArray:
+    """Tell which differences are no outliers, as jumps of the position are."""
+    return np.asarray(size <= ROBUST_SIGMAS * max(MAD_TO_SIGMA * float(np.median(size)), 1e-6))
 
 
 def slope(x: FloatArray, y: FloatArray) -> tuple[float, float]:

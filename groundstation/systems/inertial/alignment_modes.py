@@ -25,17 +25,14 @@ def still_until_s(flight: Flight, topic: str) -> tuple[float, float] | None:
     None where it is short, or the INS never writes anything else.
     """
     table = flight[topic].unique_times()
-    velocity = np.column_stack([table.values(name) for name in VELOCITY_FIELDS])
-    known = np.flatnonzero(np.isfinite(velocity).all(axis=1))
-    if not len(known):
-        return None
-    time_s = flight.seconds(table.time_ns[known])
-    moves = (velocity[known] != 0.0).any(axis=1)
+    known, moves = table.valid(*VELOCITY_FIELDS), np.zeros(len(table), dtype=bool)
+    for name in VELOCITY_FIELDS:
+        moves |= table.values(name) != 0.0
+    moves &= known
     if not moves.any():
         return None
-    first = int(np.argmax(moves))
-    end_s = float(time_s[first])
-    return (float(time_s[0]), end_s) if end_s - time_s[0] >= LEAST_STILL_S else None
+    start_s, end_s = (float(flight.seconds(table.time_ns[int(np.argmax(rows))])) for rows in (known, moves))
+    return (start_s, end_s) if end_s - start_s >= LEAST_STILL_S else None
 
 
 def alignment_before(

@@ -72,12 +72,12 @@ def ground_motion(
             column = gnss.columns["integrity_ok"]
             kept &= ~(column.mask & ~np.asarray(column.values, dtype=bool))
         gnss, gnss_s = gnss.take(kept), gnss_s[kept]
-    both = np.concatenate([ins_s, gnss_s])
-    if not len(both) or np.ptp(both) > LONGEST_S:
+    ends_s = [float(end) for part in (ins_s, gnss_s) if len(part) for end in (part.min(), part.max())]
+    if not ends_s or max(ends_s) - min(ends_s) > LONGEST_S:
         nothing, no = np.zeros((0, 2)), np.zeros(0, dtype=bool)
         return GroundMotion(np.zeros(0), nothing, nothing, nothing, no, no)
-    first_s = float(np.floor(both.min()))
-    time_s = first_s + np.arange(int(both.max() - first_s) + 1, dtype=np.float64)
+    first_s = float(np.floor(min(ends_s)))
+    time_s = first_s + np.arange(int(max(ends_s) - first_s) + 1, dtype=np.float64)
     ins_mps = _second_by_second(ins, ins_s - first_s, len(time_s))
     gnss_mps = np.full((len(time_s), 2), np.nan)
     place_m = np.full((len(time_s), 2), np.nan)
@@ -93,8 +93,8 @@ def ground_motion(
 
 
 def _second_by_second(table: Table, since_s: FloatArray, count: int) -> FloatArray:
-    velocity = np.column_stack([table.values(name) for name in VELOCITY_FIELDS])
-    return mean_in(np.floor(since_s).astype(np.int64), velocity, count)
+    second = np.floor(since_s).astype(np.int64)
+    return np.column_stack([mean_in(second, table.values(name)[:, None], count) for name in VELOCITY_FIELDS])
 
 
 def _places(gnss: Table, since_s: FloatArray, count: int) -> FloatArray:

@@ -276,7 +276,7 @@ def mean_in(bin_of: Int64Array, values: FloatArray, bins: int) -> FloatArray:
     known = np.isfinite(values)
     out = np.full((bins, values.shape[1]), np.nan)
     for column in range(values.shape[1]):
-        rows = known[:, column]
+        rows = slice(None) if known[:, column].all() else known[:, column]
         total = np.bincount(bin_of[rows], weights=values[rows, column], minlength=bins)
         count = np.bincount(bin_of[rows], minlength=bins)
         out[:, column] = np.where(count > 0, total / np.maximum(count, 1), np.nan)

@@ -205,6 +205,26 @@ def test_without_noise_position_and_velocity_agree() -> None:
     assert one.motion.lag_s == pytest.approx(0.0, abs=0.005)
 
 
+@pytest.mark.parametrize("step_s", [0.1, 1.0])
+def test_noise_of_the_fixes_is_no_other_motion(step_s: float) -> None:
+    """Fixes that scatter by 0.8 m at 10 Hz differ from their velocity by 11 m/s, and tell the same motion."""
+    time_s = times(step_s)
+    place = motion(time_s)[0] + np.random.default_rng(7).normal(0.0, 0.8, (len(time_s), 2))
+    one = receiver(table(time_s, place_m=place))
+    assert one.motion is not None and one.motion.lasting_rms_mps is not None
+    assert one.motion.difference_rms_mps == pytest.approx(1.6 / step_s, rel=0.1)
+    assert one.motion.lasting_rms_mps == pytest.approx(0.16, abs=0.05)
+    assert "velocity_apart" not in codes(table(time_s, place_m=place))
+
+
+def test_a_velocity_of_another_motion_is_told_through_the_noise() -> None:
+    time_s = times(0.1)
+    place, velocity = motion(time_s)
+    place = place + np.random.default_rng(7).normal(0.0, 0.8, (len(time_s), 2))
+    told = codes(table(time_s, place_m=place, velocity_north_mps=velocity[:, 0] + 4.0))
+    assert told["velocity_apart"] == "warn"
+
+
 @pytest.mark.parametrize("lag_s", [0.25, -0.15])
 def test_a_late_velocity_is_found_with_its_sign(lag_s: float) -> None:
     time_s = times()
