@@ -399,7 +399,7 @@ def prepared(of: Given) -> OurPass:
         accel_square_deg=float(np.degrees(of.accelerometer_misalignment)),
         lever_m=0.0,
     )
-    variances = sigmas.variances(noise, model, has_latency=False, has_slip=False, has_baro=False)
+    variances = sigmas.variances(noise, model, has_latency=False, has_slip=False, has_baro=False, has_wheels=False)
     level, heading = np.radians([LEVEL_START_DEG, HEADING_START_DEG])
     variances[:NAVIGATION] = np.square([*[POSITION_START_M] * 3, *[VELOCITY_START_MPS] * 3, level, level, heading])
     value = np.zeros(STATES)
