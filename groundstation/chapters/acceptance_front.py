@@ -65,7 +65,12 @@ def headline(found: Acceptance) -> str:
         return f"{stated(limit.share)} of flights within the limits: shown at {sure} confidence"
     if worst.decision == "fail":
         return f"{clean(limit.title)}: fewer than {stated(limit.share)} of flights within, at {sure} confidence"
-    return f"{clean(limit.title)}: {number(worst.more_with_none_over, 0)} more flights needed, none over"
+    more = f"{number(worst.more_with_none_over, 0)} more flights needed, all within"
+    return f"{clean(limit.title)}: {_over(worst)}{more}"
+
+
+def _over(one: Judgement) -> str:
+    return f"{number(one.over, 0)} of {number(one.flights, 0)} flights over; " if one.over else ""
 
 
 def _told(found: Acceptance, one: Judgement) -> str:
@@ -119,7 +124,7 @@ def is_worth_less(one: Judgement) -> bool:
 def _missing(one: Judgement) -> str:
     if one.decision != "not enough flights":
         return ""
-    more = f"Missing: {number(one.more_with_none_over, 0)} more independent flights with none over"
+    more = f"Missing: {number(one.more_with_none_over, 0)} more independent flights, all within"
     if not one.over:
         return f"{more}."
     at_share = (

@@ -11,6 +11,7 @@ from groundstation.chapters.wording import ABSENT, clean, clock, number, percent
 from groundstation.results.flight import FlightResults
 from groundstation.systems.health.answer import FIRST, HEADLINES, AutopilotHealth, Check, Happening, Measure, Verdict
 from groundstation.systems.health.plots import SIGNS, sign_of
+from groundstation.systems.health.sentence import gravity
 
 TITLE = "Autopilot health"
 LEAD = "Was GNSS good, was the filter healthy, and what went wrong when."
@@ -46,8 +47,7 @@ def health(results: FlightResults) -> Section | None:
 
 
 def _claim(answer: AutopilotHealth) -> Claim:
-    bad = [one for one in answer.checks if one.is_bad]
-    bad.sort(key=lambda one: one.verdict != "fail")
+    bad = sorted((one for one in answer.checks if one.is_bad), key=gravity)
     figures = tuple((one.title, WORDS[one.verdict], with_signs(one.reason)) for one in bad[:4])
     mark = Mark(TONES[answer.verdict], HEADLINES[answer.verdict])
     passed = sum(one.verdict == "pass" for one in answer.checks)

@@ -80,7 +80,7 @@ def told(checks: Sequence[Check]) -> str:
     """
     known = {one.key: one for one in checks}
     first = [known[key] for key in FIRST if key in known]
-    bad = sorted((one for one in checks if one.is_bad), key=_gravity)
+    bad = sorted((one for one in checks if one.is_bad), key=gravity)
     parts = [_part(one) for one in bad[:MOST_BAD]]
     if len(bad) > MOST_BAD:
         parts.append(f"and {len(bad) - MOST_BAD} more")
@@ -91,7 +91,7 @@ def told(checks: Sequence[Check]) -> str:
     return shown[:1].upper() + shown[1:]
 
 
-def _gravity(check: Check) -> tuple[bool, bool, bool]:
+def gravity(check: Check) -> tuple[bool, bool, bool]:
     """Return what orders the checks.
 
     Failed ones come first, of those a lost attitude, then GNSS, filter and vibration.
