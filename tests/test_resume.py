@@ -21,8 +21,9 @@ from groundstation.base.errors import UsageError
 from groundstation.cli.main import app
 from groundstation.pipeline.many_flights.fleet.keys import KEYS
 from groundstation.pipeline.many_flights.processes import workers
+from groundstation.pipeline.many_flights.processes.crew import in_turn
 from groundstation.pipeline.many_flights.processes.crews import crew_for
-from groundstation.pipeline.many_flights.processes.workers import TASKS_PER_PROCESS, _teller, in_turn, side_by_side
+from groundstation.pipeline.many_flights.processes.workers import TASKS_PER_PROCESS, _teller, side_by_side
 from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.many_flights.runs.dry_run import plan_many
 from groundstation.pipeline.many_flights.runs.out_folder import LOCK

@@ -34,7 +34,9 @@ class Entry:
 
 def loaded(monkeypatch: pytest.MonkeyPatch, *found: Any) -> Systems:
     entries = [Entry(f"other{place}", one) for place, one in enumerate(found)]
-    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: entries if group == ENTRY_POINT_GROUP else [])
+    monkeypatch.setattr(
+        "groundstation.base.plug_ins.entry_points_of", lambda group: entries if group == ENTRY_POINT_GROUP else []
+    )
     return load_systems(OURS, ENTRY_POINT_GROUP)
 
 

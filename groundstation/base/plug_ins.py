@@ -1,7 +1,24 @@
 """Plug-ins by entry points: other people's code, which may fail in any way."""
 
 from collections.abc import Callable
-from typing import Any
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoints
+
+
+def entry_points_of(group: str) -> "EntryPoints":
+    """Return the entry points of a group; what is installed is looked through once."""
+    found: EntryPoints = _entry_points().select(group=group)
+    return found
+
+
+@cache
+def _entry_points() -> Any:
+    from importlib.metadata import entry_points
+
+    return entry_points()
 
 
 def load_plug_ins(group: str, what: str, take: Callable[[Any], str]) -> tuple[str, ...]:
@@ -19,10 +36,8 @@ def load_plug_ins(group: str, what: str, take: Callable[[Any], str]) -> tuple[st
         ``take(found)`` keeps what an entry point names, or returns why it is left out. What it raises says why it
         cannot be used.
     """
-    from importlib.metadata import entry_points
-
     lines = []
-    for entry in sorted(entry_points(group=group), key=lambda entry: entry.name):
+    for entry in sorted(entry_points_of(group), key=lambda entry: entry.name):
         if entry.value.startswith(f"{group}."):
             continue
         try:

@@ -7,9 +7,7 @@ import dataclasses
 import typing
 from collections.abc import Mapping
 from functools import cache
-from typing import Any
-
-import cattrs
+from typing import TYPE_CHECKING, Any
 
 from groundstation.base.serial import (
     WANTED,
@@ -21,6 +19,9 @@ from groundstation.base.serial import (
     structured,
     tuple_reader,
 )
+
+if TYPE_CHECKING:
+    import cattrs
 
 LARGEST = 1 << 62  # largest number read from such a file
 
@@ -49,7 +50,7 @@ def salvaged(cls: type[Document], document: Any) -> Document:
 
 
 @cache
-def _salvager() -> cattrs.Converter:
+def _salvager() -> "cattrs.Converter":
     reader = new_reader(WANTED, float_of=_sound_number)
     reader.register_structure_hook(int, _count)
     reader.register_structure_hook_factory(
@@ -74,15 +75,17 @@ def _count(value: Any, _hint: Any) -> int:
     return value
 
 
-def _sound(reader: cattrs.Converter, value: Any, hint: Any) -> tuple[Any, ...]:
+def _sound(reader: "cattrs.Converter", value: Any, hint: Any) -> tuple[Any, ...]:
     """Return the value in a tuple of one; an empty tuple where it is not of its kind."""
+    import cattrs
+
     try:
         return (reader.structure(value, hint),)
     except (MismatchError, cattrs.BaseValidationError, RecursionError):
         return ()
 
 
-def _lenient_several(hint: Any, reader: cattrs.Converter) -> Hook:
+def _lenient_several(hint: Any, reader: "cattrs.Converter") -> Hook:
     arguments = typing.get_args(hint)
     is_mapping = origin_of(hint) is not tuple
     if not is_mapping and arguments[-1] is not Ellipsis:
@@ -98,7 +101,7 @@ def _lenient_several(hint: Any, reader: cattrs.Converter) -> Hook:
     return read
 
 
-def _lenient_object(cls: type, reader: cattrs.Converter) -> Hook:
+def _lenient_object(cls: type, reader: "cattrs.Converter") -> Hook:
     hints, parts = typing.get_type_hints(cls), dataclasses.fields(cls)
 
     def read(value: Any, _hint: Any) -> Any:

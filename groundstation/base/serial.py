@@ -13,17 +13,19 @@ import types
 import typing
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
-import cattrs
-import cattrs.gen
 import numpy as np
 
 from groundstation.base.digits import USUAL, digits_of, rounded
 from groundstation.base.errors import GroundstationError
 
+if TYPE_CHECKING:
+    import cattrs  # where something is read: its import takes as long as half of numpy's
+
 Document = TypeVar("Document")
 Hook = Callable[[Any, Any], Any]
+Writer: TypeAlias = Callable[[Any, int | None], Any]
 LEFT_OUT_WHEN_DEFAULT: Mapping[str, Any] = {"left_out_when_default": True}
 WANTED = {str: "text", float: "a number", int: "a whole number", bool: "true or false"}
 
@@ -65,62 +67,63 @@ def to_json(value: Any, name: str = "") -> Any:
     >>> to_json({"error_deg": 1.234567, "gap_s": float("nan")})
     {'error_deg': 1.2346, 'gap_s': None}
     """
-    return _writer(digits_of(name) if name else USUAL).unstructure(value)
+    return _json(value, digits_of(name) if name else USUAL)
 
 
 def to_json_exactly(value: Any) -> Any:
     """Turn a value into JSON as :func:`to_json` does, without rounding any number."""
-    return _writer(None).unstructure(value)
+    return _json(value, None)
+
+
+def _json(value: Any, digits: int | None) -> Any:
+    """Return JSON; numbers without a name of their own have so many decimals, or all."""
+    return _writer(type(value))(value, digits)  # type: ignore[arg-type]  # a class is hashable
 
 
 @cache
-def _writer(digits: int | None) -> cattrs.Converter:
-    """Return a converter that rounds the values of one name to so many decimals.
-
-    Values with names of their own are rounded by these. With ``digits`` None nothing is rounded, whatever its name.
-    """
-    writer = cattrs.Converter(unstructure_fallback_factory=lambda _cls: str)
-    for kind in (type(None), bool, int):
-        writer.register_unstructure_hook(kind, lambda value: value)
-    writer.register_unstructure_hook(float, lambda value: rounded(float(value), digits))
-    writer.register_unstructure_hook(str, str)
-    writer.register_unstructure_hook(np.floating, lambda value: rounded(float(value), digits))
-    writer.register_unstructure_hook(np.integer, int)
-    writer.register_unstructure_hook(np.bool_, bool)
-    writer.register_unstructure_hook_func(
-        lambda cls: isinstance(cls, type) and issubclass(cls, tuple | list | np.ndarray),
-        lambda values: [writer.unstructure(value) for value in values],
-    )
-    writer.register_unstructure_hook_func(
-        lambda cls: isinstance(cls, type) and issubclass(cls, Mapping),
-        lambda table: {str(key): _writer_of(str(key), digits).unstructure(value) for key, value in table.items()},
-    )
-    writer.register_unstructure_hook_factory(dataclasses.is_dataclass, lambda cls: _object_writer(cls, writer, digits))
-    return writer
+def _writer(cls: type) -> Writer:
+    """Return the writer of a class."""
+    if dataclasses.is_dataclass(cls):
+        return _object_writer(cls)
+    if issubclass(cls, bool | int | types.NoneType):
+        return lambda value, _digits: value
+    if issubclass(cls, float | np.floating):
+        return lambda value, digits: rounded(float(value), digits)
+    if issubclass(cls, np.integer | np.bool_):
+        return lambda value, _digits: value.item()
+    if issubclass(cls, tuple | list | np.ndarray):
+        return lambda values, digits: [_json(value, digits) for value in values]
+    if issubclass(cls, Mapping):
+        return lambda table, digits: {
+            str(key): _json(value, _digits_below(str(key), digits)) for key, value in table.items()
+        }
+    return lambda value, _digits: str(value)
 
 
-def _writer_of(name: str, above: int | None) -> cattrs.Converter:
-    return _writer(None if above is None else digits_of(name))
+def _digits_below(name: str, above: int | None) -> int | None:
+    """Return the decimals of what has a name of its own."""
+    return None if above is None else digits_of(name)
 
 
-def _object_writer(cls: type, writer: cattrs.Converter, digits: int | None) -> Callable[[Any], dict[str, Any]]:
+def _object_writer(cls: type) -> Writer:
     hints = typing.get_type_hints(cls)
-    parts = {
-        field.name: cattrs.gen.override(
-            omit=is_kept_apart(hints[field.name]),
-            omit_if_default="left_out_when_default" in field.metadata,
-            unstruct_hook=_writer_of(field.name, digits).unstructure,
-        )
-        for field in dataclasses.fields(cls)
-    }
-    make: Callable[..., Callable[[Any], dict[str, Any]]] = cattrs.gen.make_dict_unstructure_fn
-    write, names = make(cls, writer, **parts), list(parts)
+    parts = [field for field in dataclasses.fields(cls) if not is_kept_apart(hints[field.name])]
 
-    def written(value: Any) -> dict[str, Any]:
-        found = write(value)
-        return {name: found[name] for name in names if name in found}  # cattrs writes what may be left out last
+    def write(value: Any, digits: int | None) -> dict[str, Any]:
+        found = {}
+        for part in parts:
+            one = getattr(value, part.name)
+            if "left_out_when_default" in part.metadata and one == default_of(part):
+                continue
+            found[part.name] = _json(one, _digits_below(part.name, digits))
+        return found
 
-    return written if any(part.omit_if_default for part in parts.values()) else write
+    return write
+
+
+def default_of(field: "dataclasses.Field[Any]") -> Any:
+    """Return the default of a field; MISSING where it has none."""
+    return field.default if field.default_factory is dataclasses.MISSING else field.default_factory()
 
 
 def is_kept_apart(hint: Any) -> bool:
@@ -157,8 +160,10 @@ def from_json(cls: type[Document], document: Any) -> Document:
     return structured(_json_reader(), cls, document)
 
 
-def structured(reader: cattrs.Converter, cls: type[Document], document: Any) -> Document:
+def structured(reader: "cattrs.Converter", cls: type[Document], document: Any) -> Document:
     """Convert a document to a dataclass; raise the first fault as a :class:`MismatchError`."""
+    import cattrs
+
     try:
         return reader.structure(document, cls)
     except (cattrs.BaseValidationError, MismatchError) as error:
@@ -179,6 +184,8 @@ def first_mismatch(error: Exception) -> MismatchError:
 
 def _leaf(error: BaseException, place: str) -> tuple[str, BaseException]:
     """Follow the first complaint of a group down to its leaf; return its place and itself."""
+    import cattrs
+
     if not isinstance(error, cattrs.BaseValidationError):
         return place, error
     first = error.exceptions[0]
@@ -202,13 +209,15 @@ def join(place: str, name: str) -> str:
 
 
 @cache
-def _json_reader() -> cattrs.Converter:
+def _json_reader() -> "cattrs.Converter":
     reader = new_reader(WANTED, float_of=_json_number)
     reader.register_structure_hook_factory(dataclasses.is_dataclass, lambda cls: _object_reader(cls, reader))
     return reader
 
 
-def _object_reader(cls: type, reader: cattrs.Converter) -> Hook:
+def _object_reader(cls: type, reader: "cattrs.Converter") -> Hook:
+    import cattrs.gen
+
     read: Hook = cattrs.gen.make_dict_structure_fn(cls, reader)
 
     def strict(value: Any, kind: Any) -> Any:
@@ -221,7 +230,7 @@ def _object_reader(cls: type, reader: cattrs.Converter) -> Hook:
 
 def new_reader(
     wanted: Mapping[type, str], table: str = "an object", *, float_of: Callable[[Any], float]
-) -> cattrs.Converter:
+) -> "cattrs.Converter":
     """Return a strict converter without a rule for dataclasses.
 
     Parameters
@@ -233,6 +242,8 @@ def new_reader(
     float_of : callable
         Reads a number; raises TypeError for anything else.
     """
+    import cattrs
+
     reader = cattrs.Converter()
     for kind in (str, int, bool):
         reader.register_structure_hook(kind, partial(_plain, wanted=wanted))
@@ -284,7 +295,7 @@ def _literal(value: Any, hint: Any) -> Any:
     return value
 
 
-def tuple_reader(hints: tuple[Any, ...], reader: cattrs.Converter) -> Hook:
+def tuple_reader(hints: tuple[Any, ...], reader: "cattrs.Converter") -> Hook:
     """Return a reader of tuples, item by item, from lists alone."""
     is_fixed = len(hints) != 2 or hints[1] is not Ellipsis
 
@@ -298,8 +309,10 @@ def tuple_reader(hints: tuple[Any, ...], reader: cattrs.Converter) -> Hook:
     return read
 
 
-def _mapping_reader(hint: Any, table: str, reader: cattrs.Converter) -> Hook:
+def _mapping_reader(hint: Any, table: str, reader: "cattrs.Converter") -> Hook:
     """Return a reader of mappings, entry by entry."""
+    import cattrs.gen
+
     make: Callable[..., Hook] = cattrs.gen.mapping_structure_factory
     entries = make(hint, reader, structure_to=dict)
 
@@ -311,7 +324,9 @@ def _mapping_reader(hint: Any, table: str, reader: cattrs.Converter) -> Hook:
     return read
 
 
-def _items(values: Sequence[Any], hints: Sequence[Any], reader: cattrs.Converter) -> tuple[Any, ...]:
+def _items(values: Sequence[Any], hints: Sequence[Any], reader: "cattrs.Converter") -> tuple[Any, ...]:
+    import cattrs
+
     found = []
     for index, (value, hint) in enumerate(zip(values, hints, strict=True)):
         try:
@@ -322,7 +337,7 @@ def _items(values: Sequence[Any], hints: Sequence[Any], reader: cattrs.Converter
     return tuple(found)
 
 
-def _union_reader(hint: Any, reader: cattrs.Converter) -> Hook:
+def _union_reader(hint: Any, reader: "cattrs.Converter") -> Hook:
     """Return a reader of a value that may be of several types.
 
     It reads nothing, a dataclass named by ``kind``, a list, or the plain type that fits.

@@ -112,6 +112,30 @@ def settings_from(cls: type[Settings], table: Mapping[str, Any], where: str, key
     return found
 
 
+def trusted(cls: type[Settings], table: Mapping[str, Any]) -> Settings:
+    """Fill a dataclass from a table of our own, which a test reads strictly.
+
+    Examples
+    --------
+    >>> @dataclasses.dataclass(frozen=True)
+    ... class Wind:
+    ...     north_mps: float
+    ...     levels_m: tuple[float, ...] = ()
+    >>> trusted(Wind, {"north_mps": 3, "levels_m": [10.0]})
+    Wind(north_mps=3.0, levels_m=(10.0,))
+    """
+    hints = typing.get_type_hints(cls)
+    return cls(**{name: _trusted(hints[name], value) for name, value in table.items()})
+
+
+def _trusted(kind: Any, value: Any) -> Any:
+    if dataclasses.is_dataclass(kind):
+        return trusted(typing.cast("type[Any]", kind), value)
+    if isinstance(value, list):
+        return tuple(_trusted(typing.get_args(kind)[0], one) for one in value)
+    return float(value) if kind is float else value
+
+
 @cache
 def _reader() -> "cattrs.Converter":
     from groundstation.base.serial import new_reader

@@ -14,6 +14,8 @@ from collections.abc import Sequence
 from functools import cache
 from types import ModuleType
 
+from groundstation.base.plug_ins import entry_points_of
+
 
 @cache
 def _has_code_of_others() -> bool:
@@ -21,9 +23,7 @@ def _has_code_of_others() -> bool:
 
     Such code may hand pyarrow data from pandas.
     """
-    from importlib.metadata import entry_points
-
-    added = (entry_points(group=group) for group in ("groundstation.readers", "groundstation.systems"))
+    added = (entry_points_of(group) for group in ("groundstation.readers", "groundstation.systems"))
     return any(not one.value.startswith("groundstation.") for found in added for one in found)
 
 

@@ -13,6 +13,7 @@ import typer.core
 
 from groundstation.base.errors import GroundstationError, UsageError, lack_of_memory
 from groundstation.base.failures import Failure, reason_of
+from groundstation.cli.plain_words import with_plain_words
 from groundstation.cli.text import as_json, printable
 from groundstation.cli.text import say as say
 from groundstation.cli.text import tell as tell
@@ -93,6 +94,10 @@ def examples(verb: str) -> str:
 
 class InOrder(typer.core.TyperGroup):
     """Group of verbs in the order in which a flight passes them, wherever they are defined."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Return the options before the verb."""
+        return with_plain_words(self.callback, super().get_params(ctx))
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names, those without a place at the end."""

@@ -56,6 +56,7 @@ from groundstation.cli.application import (
     time_limit_s,
 )
 from groundstation.cli.completion import analyses
+from groundstation.cli.plain_words import PlainWords
 
 # the modules hold more verbs
 __all__ = [
@@ -439,8 +440,14 @@ def _application_for(words: Sequence[str]) -> typer.Typer:
     if not asked:
         return app
     alone = copy(app)
-    alone.registered_commands, alone.registered_groups = asked, []
+    alone.registered_commands, alone.registered_groups = [_with_plain_words(verb) for verb in asked], []
     return alone
+
+
+def _with_plain_words(verb: CommandInfo) -> CommandInfo:
+    plain = copy(verb)
+    plain.cls = PlainWords
+    return plain
 
 
 def _name_of(verb: CommandInfo) -> str:

@@ -9,9 +9,9 @@ from groundstation.base.text_columns import columns
 from groundstation.cli.lines import Lines
 from groundstation.cli.text import as_json, printable, say, tell
 from groundstation.pipeline.one_flight.outcome import Outcome, State, worst_code
-from groundstation.pipeline.verbs.describe import BusWord, Description
 
 if TYPE_CHECKING:
+    from groundstation.pipeline.verbs.describe import BusWord, Description
     from groundstation.pipeline.verbs.settings_list import Setting
 
 NAMED_SHOWN = 6  # words of a bus that an ICD names, listed one by one
@@ -19,7 +19,7 @@ NAMED_SHOWN = 6  # words of a bus that an ICD names, listed one by one
 __all__ = ["as_json", "catalogue", "description", "outcomes", "worst_code"]
 
 
-def description(what: Description, *, everything: bool = False) -> str:
+def description(what: "Description", *, everything: bool = False) -> str:
     """Return the text of ``info``: a line for each bus, with ``everything`` for each word."""
     head = [[f"{key}:", printable(value)] for key, value in what.facts.items()]
     parts = [columns(head)]
@@ -46,7 +46,7 @@ def description(what: Description, *, everything: bool = False) -> str:
     return "\n\n".join(parts)
 
 
-def _every_word(buses: Sequence[BusWord]) -> str:
+def _every_word(buses: "Sequence[BusWord]") -> str:
     """Return a line for each terminal and subaddress, or label."""
     rows = [["channel", "bus", "what", "count", "rate Hz", "ICD"]]
     for one in buses:
@@ -55,7 +55,7 @@ def _every_word(buses: Sequence[BusWord]) -> str:
     return columns(rows, right=(3, 4))
 
 
-def _every_bus(buses: Sequence[BusWord]) -> str:
+def _every_bus(buses: "Sequence[BusWord]") -> str:
     """Return a line for each bus, with what the ICD names on it."""
     rows = [["channel", "bus", "words", "kinds", "named", "by the ICD"]]
     for place, found in groupby(buses, key=lambda one: one.place):

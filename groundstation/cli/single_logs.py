@@ -165,12 +165,15 @@ def convert(
     """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.many_flights.runs.references import judged_by
     from groundstation.pipeline.one_flight.configuration import load_configuration
     from groundstation.pipeline.verbs.conversions import convert_many, convert_together
 
     settings = load_configuration(config, profile=profile, thresholds=thresholds, icds=icd)
-    configuration = judged_by(settings, reference or (), is_one_log=together or len(logs) == 1)
+    configuration = settings
+    if reference:
+        from groundstation.pipeline.many_flights.runs.references import judged_by
+
+        configuration = judged_by(settings, reference, is_one_log=together or len(logs) == 1)
     if together and timeout is not None:
         raise UsageError("--together", "--timeout", "--together without it")
     with listener("none" if quiet else progress) as listen:

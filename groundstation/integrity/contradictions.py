@@ -17,6 +17,7 @@ from groundstation.base.climb import OPPOSITE, climb_agreement
 from groundstation.base.geodesy import METRES_PER_DEG
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.signals import kind_of
+from groundstation.base.sorted_values import distinct, median
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.stuck import MotionSampler
@@ -151,9 +152,9 @@ def _windows_of(one: _Series) -> _Windows | None:
     if len(time_s) < 2:
         return None
     # Edges beside a sample only: damaged times may be centuries apart.
-    steps = np.unique(np.floor((time_s - time_s[0]) / WINDOW_S))
-    edges_s = time_s[0] + WINDOW_S * np.unique(np.concatenate([steps, steps + 1.0]))
-    ends = np.unique(np.searchsorted(time_s, edges_s[edges_s < time_s[-1]]))
+    steps = distinct(np.floor((time_s - time_s[0]) / WINDOW_S))
+    edges_s = time_s[0] + WINDOW_S * distinct(np.concatenate([steps, steps + 1.0]))
+    ends = distinct(np.searchsorted(time_s, edges_s[edges_s < time_s[-1]]))
     if len(ends) < 2:
         return None
     start, end = ends[:-1], ends[1:]
@@ -185,7 +186,7 @@ def _speed(one: _Series, windows: _Windows | None, zero_ns: int) -> Contradictio
     rows = _lasting(windows.start_s, windows.end_s, np.nan_to_num(apart) > allowed)
     if rows is None:
         return None
-    implied, told = np.median(windows.speed_mps[rows]), np.median(speed[rows])
+    implied, told = median(windows.speed_mps[rows]), median(speed[rows])
     text = f"positions of {one.topic} imply {implied:.3g} m/s, logged are {told:.3g} m/s"
     if abs(implied - told) <= SPEED_MPS + SPEED_SHARE * max(implied, told):
         moved = direction_of(windows.north_mps[rows], windows.east_mps[rows])
@@ -206,7 +207,7 @@ def _side(one: _Series, windows: Mapping[str, _Windows], zero_ns: int) -> Contra
     rows = _lasting(time_s, np.minimum(ends_s, time_s + LONGEST_STEP_S), is_side)
     if rows is None:
         return None
-    text = f"{one.topic} rolls by {np.median(np.abs(roll[rows])):.1f} deg while the vehicle moves"
+    text = f"{one.topic} rolls by {median(np.abs(roll[rows])):.1f} deg while the vehicle moves"
     return _told(one.topic, text, time_s, ends_s, rows, zero_ns)
 
 
@@ -265,14 +266,14 @@ def _height(one: _Series, series: list[_Series], zero_ns: int) -> Contradiction 
     both = np.isfinite(pressure)
     if not both.any():
         return None
-    climbed = [values - np.median(values[both]) for values in (height, pressure)]
+    climbed = [values - median(values[both]) for values in (height, pressure)]
     apart = np.abs(climbed[0] - climbed[1])
     allowed = HEIGHT_M + HEIGHT_SHARE * np.maximum(*np.abs(climbed))
     ends_s = np.minimum(np.append(time_s[1:], time_s[-1:]), time_s + LONGEST_STEP_S)
     rows = _lasting(time_s, ends_s, both & (np.nan_to_num(apart) > allowed))
     if rows is None:
         return None
-    text = f"height of {one.topic} and pressure altitude drift {np.median(apart[rows]):.0f} m apart"
+    text = f"height of {one.topic} and pressure altitude drift {median(apart[rows]):.0f} m apart"
     return _told(one.topic, text, time_s, ends_s, rows, zero_ns)
 
 

@@ -15,7 +15,7 @@ from groundstation.base.errors import SettingsError
 from groundstation.base.ledger import ThresholdsUsed
 from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.signals import TOPICS, field_of, kind_of
-from groundstation.base.toml_settings import required_number, settings_from
+from groundstation.base.toml_settings import required_number, settings_from, trusted
 from groundstation.integrity.clock_references import RelationSettings
 from groundstation.integrity.clock_steps import ClockSettings
 from groundstation.integrity.counting import CountingSettings
@@ -147,8 +147,9 @@ class Thresholds:
 @cache
 def shipped() -> Thresholds:
     """The shipped thresholds."""
-    file = _FILES.read(SHIPPED)
-    return _thresholds(file.table, file.where, "")
+    stated = dict(_FILES.read(SHIPPED).table)
+    ranges = _ranges(stated.pop("ranges", {}), SHIPPED, "ranges")
+    return replace(trusted(Thresholds, stated), ranges=ranges)
 
 
 def thresholds_from(table: Mapping[str, Any], where: str = "thresholds", key: str = "") -> Thresholds:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from groundstation.base.records import BoolArray, Column, Int64Array, LogHeader, NewLog
+from groundstation.base.sorted_values import distinct
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import ClockModel, ClockOffsets, estimate_clock
 from groundstation.integrity.clock_references import ClockReferences
@@ -278,7 +279,7 @@ def _with_mixed(clock: ClockModel, part: PowerUp, window: Window) -> ClockModel:
 
 def _wrapped(clock: ClockModel, part: PowerUp) -> ClockModel:
     """Return the model for times as the device wrote them, from that of a counter without end."""
-    starts = np.unique(np.concatenate((clock.starts, [wrap.record_index for wrap in part.wraps])).astype(np.int64))
+    starts = distinct(np.concatenate((clock.starts, [wrap.record_index for wrap in part.wraps])).astype(np.int64))
     offsets = ClockOffsets(clock.starts, clock.offsets_ns).at(starts)
     for wrap in part.wraps:
         offsets = offsets + np.where(starts >= wrap.record_index, wrap.modulus_ns, 0)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.records import BoolArray, Column, Int64Array
+from groundstation.base.sorted_values import distinct
 from groundstation.store.marks import RECORD_PREFIX
 from groundstation.store.messages import HEAD, MESSAGE_OPCODE, ByteArray, ChunkMessages, at_any_byte
 from groundstation.store.schema import WireField, varint
@@ -91,7 +92,7 @@ class Slot(NamedTuple):
             yield rows, self.prefix + varint(int(lengths[0])), matrix[:, : lengths[0]]
             return
         positions = np.arange(len(self.values)) if isinstance(rows, slice) else rows
-        for length in np.unique(lengths):
+        for length in distinct(lengths):
             chosen = np.flatnonzero(lengths == length)
             yield positions[chosen], self.prefix + varint(int(length)), matrix[chosen, :length]
 
@@ -198,7 +199,7 @@ def _alike(slots: Sequence[Slot], count: int) -> list[tuple[Rows, list[Slot]]] |
     pattern = np.zeros(count, np.int64)
     for mask in partial.values():
         pattern = pattern * 2 + mask
-    patterns = np.unique(pattern).tolist()
+    patterns = distinct(pattern).tolist()
     if len(patterns) * ROWS_ALIKE > count:
         return None
     groups: list[tuple[Rows, list[Slot]]] = []

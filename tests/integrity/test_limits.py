@@ -9,7 +9,7 @@ from groundstation.base.errors import SettingsError
 from groundstation.base.signals import TOPICS
 from groundstation.integrity.clock_steps import ClockSettings
 from groundstation.integrity.counting import CountingSettings
-from groundstation.integrity.limits import shipped, thresholds_from
+from groundstation.integrity.limits import _FILES, SHIPPED, shipped, thresholds_from
 
 
 def test_the_shipped_file_states_what_the_code_takes_without_it() -> None:
@@ -20,6 +20,10 @@ def test_the_shipped_file_states_what_the_code_takes_without_it() -> None:
         ended = {field.name: (field.low, field.high) for field in fields if field.kind == "double"}
         ended = {name: ends for name, ends in ended.items() if not all(math.isinf(end) for end in ends)}
         assert found.ranges.get(kind, {}) == ended, kind
+
+
+def test_the_shipped_file_holds_under_the_strict_rules_for_users() -> None:
+    assert thresholds_from(_FILES.read(SHIPPED).table) == shipped()
 
 
 def test_what_the_user_states_replaces_and_the_rest_stays() -> None:

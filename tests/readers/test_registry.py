@@ -132,7 +132,7 @@ class Loaded:
 @pytest.fixture
 def plug_ins(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
     entries: list[Any] = []
-    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: entries)
+    monkeypatch.setattr("groundstation.base.plug_ins.entry_points_of", lambda group: entries)
     registry._plug_ins.cache_clear()
     yield entries
     registry._plug_ins.cache_clear()

@@ -5,20 +5,22 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.base.signals import is_canonical
 from groundstation.integrity.limits import Thresholds
 from groundstation.pipeline.many_flights.inputs import no_log
-from groundstation.pipeline.many_flights.processes.apart import outcomes_apart
-from groundstation.pipeline.many_flights.processes.confined import ProcessLimits
-from groundstation.pipeline.many_flights.processes.workers import Crew, in_turn
+from groundstation.pipeline.many_flights.processes.crew import Crew, in_turn
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
 from groundstation.pipeline.one_flight.log import Log, as_log, log_name, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.store.writer import clear_parts
+
+if TYPE_CHECKING:
+    from groundstation.pipeline.many_flights.processes.confined import ProcessLimits
 
 WRITTEN = (".mcap", ".ch10")
 
@@ -29,7 +31,7 @@ def convert_many(
     *,
     configuration: Configuration | None = None,
     force: bool = False,
-    bounds: ProcessLimits | None = None,
+    bounds: "ProcessLimits | None" = None,
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
     """Convert logs to MCAP: one to the file ``output``, several into the folder ``output``.
@@ -66,6 +68,8 @@ def convert_many(
     jobs = [_Job(log, target, configuration) for log, target in zip(logs, targets, strict=True)]
     crew: Crew = partial(in_turn, listen=listen)
     if bounds is not None:
+        from groundstation.pipeline.many_flights.processes.apart import outcomes_apart
+
         crew = partial(outcomes_apart, workers=1, listen=listen, bounds=bounds)
     outcomes = []
     for number, outcome in crew(enumerate(jobs), _convert_one):

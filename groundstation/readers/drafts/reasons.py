@@ -2,12 +2,14 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Damage, Item
-from groundstation.readers.drafts.causes import cause_of_numbers, cause_of_times
-from groundstation.readers.drafts.sample import TableSample, sample_of
 from groundstation.readers.source import Source
+
+if TYPE_CHECKING:
+    from groundstation.readers.drafts.sample import TableSample
 
 
 def with_reasons(items: Iterator[Item], source: Source, columns: Mapping[str, str], time: str) -> Iterator[Item]:
@@ -26,6 +28,8 @@ def with_reasons(items: Iterator[Item], source: Source, columns: Mapping[str, st
     for item in items:
         place = item.place.rpartition(", row")[0] if isinstance(item, Damage) else ""
         if isinstance(item, Damage) and item.kind == "unreadable_cells" and place in columns:
+            from groundstation.readers.drafts.sample import sample_of  # most tables have no such damage
+
             try:
                 sample = sample or sample_of(source)
             except GroundstationError:
@@ -37,8 +41,10 @@ def with_reasons(items: Iterator[Item], source: Source, columns: Mapping[str, st
             yield item
 
 
-def _cause(sample: TableSample, name: str, *, is_time: bool) -> str:
+def _cause(sample: "TableSample", name: str, *, is_time: bool) -> str:
     if name not in sample.names:
         return ""
+    from groundstation.readers.drafts.causes import cause_of_numbers, cause_of_times
+
     cells = sample.filled(sample.names.index(name))
     return cause_of_times(cells) if is_time and cells else cause_of_numbers(cells, sample.delimiter)

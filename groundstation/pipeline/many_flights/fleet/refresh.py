@@ -21,7 +21,7 @@ from groundstation.pipeline.many_flights.fleet.rows import share_of
 from groundstation.pipeline.many_flights.fleet.samples import SampleStore
 from groundstation.pipeline.many_flights.fleet.scan import FLIGHTS, Scan, month_path, rows_of, scan, stamp_of
 from groundstation.pipeline.many_flights.fleet.table import to_arrow
-from groundstation.pipeline.many_flights.processes.workers import Crew, in_turn
+from groundstation.pipeline.many_flights.processes.crew import Crew, in_turn
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Listener, silent
 from groundstation.results.files import parquet_bytes, utf8_text, write_bytes

@@ -18,7 +18,7 @@ from typing import Any, Generic, TypeVar
 from groundstation.base.errors import UsageError
 from groundstation.base.serial import MismatchError, from_json
 from groundstation.pipeline.many_flights.processes.confined import ProcessLimits, begin
-from groundstation.pipeline.many_flights.processes.workers import AnyJob, Work
+from groundstation.pipeline.many_flights.processes.crew import AnyJob, Work
 from groundstation.pipeline.one_flight.isolation import Isolation
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.base.version import __version__
-from groundstation.pipeline.many_flights.processes.workers import AnyJob, Work, overdue
+from groundstation.pipeline.many_flights.processes.crew import AnyJob, Work
+from groundstation.pipeline.many_flights.processes.workers import overdue
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Listener, silent
 

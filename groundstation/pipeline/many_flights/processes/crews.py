@@ -6,7 +6,8 @@ from functools import partial
 
 from groundstation.pipeline.many_flights.processes.apart import outcomes_apart
 from groundstation.pipeline.many_flights.processes.confined import ProcessLimits
-from groundstation.pipeline.many_flights.processes.workers import TASKS_PER_PROCESS, Crew, in_turn, side_by_side
+from groundstation.pipeline.many_flights.processes.crew import Crew, in_turn
+from groundstation.pipeline.many_flights.processes.workers import TASKS_PER_PROCESS, side_by_side
 from groundstation.pipeline.one_flight.progress import Listener
 
 

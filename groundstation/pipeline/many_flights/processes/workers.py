@@ -17,9 +17,10 @@ from dataclasses import asdict, dataclass, field
 from functools import partial
 from multiprocessing.connection import Connection
 from multiprocessing.connection import wait as wait_for
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic
 
 from groundstation.base.without_pandas import spare_pandas
+from groundstation.pipeline.many_flights.processes.crew import AnyJob, Work
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 
@@ -29,42 +30,10 @@ LOOK_EVERY_S, END_S = 0.2, 5.0  # for jobs that take too long; given to their pr
 _END = b""
 
 
-class Work(Protocol):
-    """Job of any kind: its log as the user would type it, and the log's name."""
-
-    @property
-    def log(self) -> str: ...
-
-    @property
-    def name(self) -> str: ...
-
-
-AnyJob = TypeVar("AnyJob", bound=Work)
-
-
-class Crew(Protocol):
-    """Runs jobs, in whatever order; yields the number and the outcome of each as it ends."""
-
-    def __call__(
-        self, tasks: Iterable[tuple[int, AnyJob]], run: Callable[[AnyJob, Listener], Outcome], /
-    ) -> Generator[tuple[int, Outcome]]: ...
-
-
 # Spawned, never forked: numba, Arrow and Rerun hold threads that a fork would freeze.
 _CONTEXT = multiprocessing.get_context("spawn")
 _tell: Listener = silent  # of a worker process: how it tells the run of its stages
 _tell_begin: Callable[[object], None] = print  # ... and of the number of a job that it begins
-
-
-def in_turn(
-    tasks: Iterable[tuple[int, AnyJob]], run: Callable[[AnyJob, Listener], Outcome], *, listen: Listener
-) -> Generator[tuple[int, Outcome]]:
-    """Run jobs in this process, one after the other.
-
-    Yields the number and the outcome of each.
-    """
-    for number, job in tasks:
-        yield number, run(job, listen)
 
 
 def side_by_side(

@@ -23,8 +23,9 @@ from groundstation.pipeline.many_flights.fleet.refresh import refresh
 from groundstation.pipeline.many_flights.fleet.scan import Scan
 from groundstation.pipeline.many_flights.inputs import is_remote, session_folders
 from groundstation.pipeline.many_flights.processes.apart import bounds_of
+from groundstation.pipeline.many_flights.processes.crew import AnyJob, Crew, in_turn
 from groundstation.pipeline.many_flights.processes.crews import cores, crew_for
-from groundstation.pipeline.many_flights.processes.workers import TASKS_PER_PROCESS, AnyJob, Crew, in_turn
+from groundstation.pipeline.many_flights.processes.workers import TASKS_PER_PROCESS
 from groundstation.pipeline.many_flights.remote.jobs import RemoteJob, digest_remote, run_remote
 from groundstation.pipeline.many_flights.remote.output import RemoteOutput
 from groundstation.pipeline.many_flights.runs.consecutive import flights_of_parts
