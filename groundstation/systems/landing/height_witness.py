@@ -16,7 +16,7 @@ from groundstation.systems.landing.ground import (
     Ground,
     Heights,
 )
-from groundstation.systems.landing.witnesses import Hint
+from groundstation.systems.landing.witnesses import Hint, decaying_sum
 
 AIR_HEIGHT_M = 1.5  # mean height in the last seconds before a touchdown
 AIR_SINK_MPS, AIR_SINK_SIGMA_MPS = 0.8, 0.8  # vertical speed there
@@ -98,8 +98,6 @@ def _of_heights(
 
 def _of_sinks(time_s: FloatArray, shown_mps: FloatArray, weight: float, contact_s: FloatArray) -> FloatArray:
     """Log likelihood over contacts by sink rates; high above, any is one of flight."""
-    from scipy.signal import lfilter
-
     before = np.searchsorted(time_s, contact_s, side="left")
 
     def sums(values: FloatArray) -> FloatArray:
@@ -114,7 +112,7 @@ def _of_sinks(time_s: FloatArray, shown_mps: FloatArray, weight: float, contact_
         floating = sums(_log_normal(shown_mps, sink))
         start = descent - floating
         highest = start.max(axis=1, keepdims=True)
-        begun = lfilter([COARSE_S / FLOAT_S], [1.0, -keep], np.exp(start - highest), axis=1)
+        begun = decaying_sum(COARSE_S / FLOAT_S, keep, np.exp(start - highest))
         floats.append(np.log(begun + 1e-300) + highest + floating)
     return _over_nodes(descent, _log_sum(np.array(floats), 0) - np.log(len(FLOAT_SINKS_MPS)), ground)
 

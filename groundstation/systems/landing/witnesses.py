@@ -252,8 +252,18 @@ def _between(grid_s: FloatArray, low_s: float, high_s: float, sigma_s: float, de
 
 def or_before(likelihood: FloatArray, share: float, mean_s: float, step_s: float) -> FloatArray:
     """Return a likelihood whose cause came earlier in a share of cases, exponentially."""
-    from scipy.signal import lfilter
-
     keep = float(np.exp(-step_s / mean_s))
-    earlier = lfilter([1.0 - keep], [1.0, -keep], likelihood[::-1])[::-1]
+    earlier = decaying_sum(1.0 - keep, keep, likelihood[::-1])[::-1]
     return np.asarray((1.0 - share) * likelihood + share * earlier)
+
+
+def decaying_sum(gain: float, keep: float, values: FloatArray) -> FloatArray:
+    """Return ``total[k] = keep total[k - 1] + gain values[k]`` along the last axis.
+
+    A plain loop: ``scipy.signal``, which has it as ``lfilter``, takes longer to import than a whole landing.
+    """
+    out = np.empty(values.shape)
+    total = np.zeros(values.shape[:-1])
+    for k in range(values.shape[-1]):
+        out[..., k] = total = keep * total + gain * values[..., k]
+    return out

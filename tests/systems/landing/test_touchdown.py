@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.chapters.markdown import markdown
@@ -28,7 +29,7 @@ from groundstation.systems.landing.settings import LandingSettings
 from groundstation.systems.landing.sink import sink_rate_of
 from groundstation.systems.landing.touchdown_answer import Touchdown, Witness
 from groundstation.systems.landing.touchdown_study import FAMILIES, TouchdownFamily, _mean_sink, drawn, study_touchdown
-from groundstation.systems.landing.witnesses import LoadSamples, by_wheel_speed
+from groundstation.systems.landing.witnesses import LoadSamples, by_wheel_speed, decaying_sum
 from groundstation.tables.phases import PhaseInterval, Phases, flight_phases
 from tests.real_logs import real_log
 from tests.report_example import example
@@ -277,3 +278,9 @@ def test_a_multicopter_touches_nothing_down() -> None:
     path = path_of(flight, LandingSettings())
     ends = [one.end_s for one in flight_phases(flight).intervals if one.phase == "airborne"]
     assert all(evidence_of(flight, path, end_s) is None for end_s in [*ends, 0.5 * flight.duration_s])
+
+
+def test_decaying_sum_is_the_filter_of_scipy_to_the_bit() -> None:
+    values = np.exp(20.0 * np.random.default_rng(0).normal(size=(9, 161)))
+    for gain, keep in ((0.04, 0.963), (0.0132, 0.9868)):
+        assert np.array_equal(decaying_sum(gain, keep, values), lfilter([gain], [1.0, -keep], values, axis=-1))
