@@ -1,9 +1,13 @@
 """Results of studies: tables, and a page of sections, told as those of a report are."""
 
+import multiprocessing
+import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -14,6 +18,10 @@ from groundstation.results.figures import FigureData
 OutcomeT = TypeVar("OutcomeT")
 FamilyT = TypeVar("FamilyT", bound="Named")
 Row = Mapping[str, object]
+Mapped = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
+
+POOLED_FROM = 8  # fewer jobs are done before other processes have started
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class Named(Protocol):
@@ -46,6 +54,36 @@ def judged_families(
         if progress:
             progress(f"{family.name}: {told(rows[-1])}")
     return rows
+
+
+@contextmanager
+def mapped(jobs: int) -> Iterator[Mapped]:
+    """Return a map over jobs: in this process for a few, else in single-threaded processes."""
+    workers = min(jobs, os.cpu_count() or 1)
+    if jobs < POOLED_FROM or workers < 2:
+        yield map
+        return
+    with _environment(dict.fromkeys(ONE_THREAD, "1")):
+        pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
+        try:
+            yield pool.map
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _environment(changes: dict[str, str]) -> Iterator[None]:
+    """Set environment variables for processes started meanwhile."""
+    before = {name: os.environ.get(name) for name in changes}
+    os.environ.update(changes)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
 
 
 def table_of(name: str, rows: Sequence[Row], digits: Mapping[str, int]) -> FigureData:

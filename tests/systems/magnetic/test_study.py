@@ -8,6 +8,7 @@ import pytest
 from groundstation.results.figures import FigureData
 from groundstation.simulation.magnetic_family import MagneticFamilySettings, draw_magnetic_scenario
 from groundstation.simulation.scenario import MagnetometerSettings
+from groundstation.systems import study
 from groundstation.systems.magnetic.estimate import estimate_deviation
 from groundstation.systems.magnetic.study import runs as magnetic_runs
 from groundstation.systems.magnetic.study import tables as magnetic_tables
@@ -137,7 +138,7 @@ def test_a_whole_flight_is_answered_and_judged() -> None:
 def test_seed_decides_everything_in_one_process_and_in_several(monkeypatch: pytest.MonkeyPatch) -> None:
     jobs = [job(run, (REFERENCE,)) for run in (0, 1)]
     alone = run_jobs(jobs)
-    monkeypatch.setattr(magnetic_runs, "POOLED_FROM", 1)
+    monkeypatch.setattr(study, "POOLED_FROM", 1)
     pooled = run_jobs(jobs)
     for one, other in zip(alone, pooled, strict=True):
         assert np.array_equal(one.swept[0].rms_deg, other.swept[0].rms_deg, equal_nan=True)

@@ -9,6 +9,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.quantiles import chi_square_quantile
+from groundstation.base.records import Int64Array
 from groundstation.base.units import MPS2_PER_G
 from groundstation.methods.ins_noise import GnssNoise
 from groundstation.results.figures import FigureData
@@ -17,6 +18,7 @@ from groundstation.simulation.ins_class import load_ins_class
 from groundstation.systems.inertial.filter import ChannelsRun, DifferenceEpochs, run_filter
 from groundstation.systems.inertial.model import SIZE, ChannelModel
 from groundstation.systems.inertial.study.cases import matched_noise
+from groundstation.systems.study import mapped
 
 RUNS = 100
 DURATION_S = 16_000
@@ -65,6 +67,16 @@ def matched_run(seed: int, number: int, *, duration_s: int = DURATION_S, uses_ve
     return MatchedRun(run_filter(epochs, ChannelModel(MPS2_PER_G, RADIUS_M, noise.beta_per_s), noise), states)
 
 
+def _judged(job: tuple[int, int, bool]) -> tuple[list[float], FloatArray, Int64Array]:
+    """Return the NEES of a run at some times, and the sums and counts of its NIS, both shape (2,)."""
+    seed, number, uses_velocity = job
+    matched = matched_run(seed, number, uses_velocity=uses_velocity)
+    ratio = np.square(matched.run.innovation) / matched.run.innovation_variance
+    known = np.isfinite(ratio)
+    nees = [matched.nees(epoch) for epoch in TIMES_S]
+    return nees, np.where(known, ratio, 0.0).sum(axis=(0, 2)), known.sum(axis=(0, 2))
+
+
 def consistency_table(seed: int, runs: int = RUNS, *, uses_velocity: bool = True) -> FigureData:
     """Tabulate mean NEES per state at some times, and mean NIS, over ``runs`` flights.
 
@@ -72,13 +84,11 @@ def consistency_table(seed: int, runs: int = RUNS, *, uses_velocity: bool = True
     ``freedom`` degrees of freedom: flights and channels are independent, and so are innovations of one another.
     """
     nees, nis, count = np.zeros(len(TIMES_S)), np.zeros(2), np.zeros(2, dtype=np.int64)
-    for number in range(runs):
-        matched = matched_run(seed, number, uses_velocity=uses_velocity)
-        nees += [matched.nees(epoch) for epoch in TIMES_S]
-        ratio = np.square(matched.run.innovation) / matched.run.innovation_variance
-        known = np.isfinite(ratio)
-        nis += np.where(known, ratio, 0.0).sum(axis=(0, 2))
-        count += known.sum(axis=(0, 2))
+    with mapped(runs) as each:
+        for of_run in each(_judged, [(seed, number, uses_velocity) for number in range(runs)]):
+            nees += of_run[0]
+            nis += of_run[1]
+            count += of_run[2]
     freedom = np.array([2 * SIZE * runs] * len(TIMES_S) + [number for number in count.tolist() if number])
     total = np.concatenate([nees, nis[count > 0]])
     names = [f"NEES at {seconds} s" for seconds in TIMES_S] + ["NIS position", "NIS velocity"][: int((count > 0).sum())]

@@ -3,10 +3,9 @@
 See docs/decisions/012.
 """
 
-import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 
@@ -40,7 +39,7 @@ from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.skill import QUANTILES, claimed_sigma
 from groundstation.systems.inertial.start_covariance import lead_growth
 from groundstation.systems.inertial.study.cases import FilterCase, differences_of, epochs_of, model_of
-from groundstation.systems.inertial.study.runs import WORKERS
+from groundstation.systems.study import mapped
 
 LEAD_STEP_S, LEADS = 600.0, 12
 STEP_S, VARIANCE_STEP_S = 10.0, 60.0
@@ -242,11 +241,14 @@ def fly_bank(case: FilterCase, run: int, settings: InertialSettings) -> BankOutc
 def fly_banks(cases: Sequence[FilterCase], runs: int, settings: InertialSettings) -> dict[str, list[BankOutcome]]:
     """Fly so many flights of every case that stands for real ones."""
     chosen = [case for case in cases if case.is_held_out]
-    with ThreadPoolExecutor(min(WORKERS, os.cpu_count() or 1)) as pool:
-        return {
-            case.name: list(pool.map(lambda run, case=case: fly_bank(case, run, settings), range(runs)))
-            for case in chosen
-        }
+    jobs = [(case, run, settings) for case in chosen for run in range(runs)]
+    with mapped(len(jobs)) as each:
+        found = iter(each(_fly_bank, jobs))
+        return {case.name: list(islice(found, runs)) for case in chosen}
+
+
+def _fly_bank(job: tuple[FilterCase, int, InertialSettings]) -> BankOutcome:
+    return fly_bank(*job)
 
 
 def bank_table(outcomes: Mapping[str, Sequence[BankOutcome]]) -> FigureData:

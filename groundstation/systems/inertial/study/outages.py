@@ -3,10 +3,9 @@
 The smoother inside them, the forecasts through and after them, and their bands.
 """
 
-import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import islice
 from zlib import crc32
 
 import numpy as np
@@ -25,7 +24,8 @@ from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.skill import QUANTILES, claimed_sigma
 from groundstation.systems.inertial.start_covariance import lead_growth
 from groundstation.systems.inertial.study.cases import NO_GATE, FilterCase, differences_of, epochs_of, model_of
-from groundstation.systems.inertial.study.runs import WORKERS, mean_known
+from groundstation.systems.inertial.study.runs import mean_known
+from groundstation.systems.study import mapped
 
 FIRST_S, LENGTHS_S, BETWEEN_S = 3600.0, (60.0, 3600.0), (900.0, 1800.0)
 AFTER_MIN = (10.0, 30.0, 60.0)
@@ -165,11 +165,14 @@ def _after(
 def fly_outages(cases: Sequence[FilterCase], runs: int, settings: InertialSettings) -> dict[str, list[OutageOutcome]]:
     """Fly so many flights of every case that stands for real ones, with outages in their logs."""
     chosen = [case for case in cases if case.is_held_out]
-    with ThreadPoolExecutor(min(WORKERS, os.cpu_count() or 1)) as pool:
-        return {
-            case.name: list(pool.map(lambda run, case=case: fly_with_outages(case, run, settings), range(runs)))
-            for case in chosen
-        }
+    jobs = [(case, run, settings) for case in chosen for run in range(runs)]
+    with mapped(len(jobs)) as each:
+        found = iter(each(_fly_with_outages, jobs))
+        return {case.name: list(islice(found, runs)) for case in chosen}
+
+
+def _fly_with_outages(job: tuple[FilterCase, int, InertialSettings]) -> OutageOutcome:
+    return fly_with_outages(*job)
 
 
 def outage_table(outcomes: Mapping[str, Sequence[OutageOutcome]]) -> FigureData:

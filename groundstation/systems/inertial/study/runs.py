@@ -3,9 +3,7 @@
 A small outcome of each is kept.
 """
 
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -23,6 +21,7 @@ from groundstation.systems.inertial.replay import plan_replay
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.skill import QUANTILES, WITH_SIGMA, Claimed, claimed_sigma
 from groundstation.systems.inertial.study.cases import FilterCase, differences_of, epochs_of, model_of
+from groundstation.systems.study import mapped
 
 Progress = Callable[[str], None]
 
@@ -33,7 +32,6 @@ STUDY_HORIZONS_MIN = (10.0, 30.0, 60.0, 84.0, 120.0)
 CLASSIC_START_H = (1.5, 2.0, 2.5, 3.0)
 SETS_OF_STARTS = ("all", *(f"{hours:g} h" for hours in CLASSIC_START_H))
 LEVELS = tuple(QUANTILES)
-WORKERS = 2
 
 
 @dataclass(frozen=True)
@@ -113,31 +111,41 @@ def run_cases(
     Returns
     -------
     dict of case name to tuple of Outcome
-        In the order of the flights, whatever the number of threads.
+        In the order of the flights, whatever the number of processes.
     """
-    flights: list[tuple[list[FilterCase], int]] = []
+    flights: list[StudyFlight] = []
     for seed in dict.fromkeys(case.seed for case in cases):
-        together = [case for case in cases if case.seed == seed]
+        together = tuple(case for case in cases if case.seed == seed)
         flown = calibrated_runs if together[0].is_new else runs
-        flights += [(together, run) for run in range(flown)]
+        flights += [StudyFlight(together, run, run < calibrated_runs, settings) for run in range(flown)]
     outcomes: dict[str, list[CaseFlight]] = {case.name: [] for case in cases}
-
-    def fly(flight: tuple[list[FilterCase], int]) -> list[CaseFlight]:
-        together, run = flight
-        return _fly(together, run, run < calibrated_runs, settings)
-
-    with ThreadPoolExecutor(min(WORKERS, os.cpu_count() or 1)) as pool:
-        for (together, run), found in zip(flights, pool.map(fly, flights), strict=True):
-            for case, outcome in zip(together, found, strict=True):
+    with mapped(len(flights)) as each:
+        for flight, found in zip(flights, each(fly, flights), strict=True):
+            for case, outcome in zip(flight.cases, found, strict=True):
                 outcomes[case.name].append(outcome)
             if progress:
-                progress(f"flight {run} of {', '.join(case.name for case in together)}")
+                progress(f"flight {flight.run} of {', '.join(case.name for case in flight.cases)}")
     return {name: tuple(several) for name, several in outcomes.items()}
 
 
-def _fly(cases: list[FilterCase], run: int, is_calibrated: bool, settings: InertialSettings) -> list[CaseFlight]:
-    batch = simulate_family(cases[0].family, 1, cases[0].seed, first_run=run)
-    return [replay_flight(case, batch, 0, is_calibrated and case.is_calibrated, settings) for case in cases]
+@dataclass(frozen=True)
+class StudyFlight:
+    """One flight to simulate, and the cases that filter it."""
+
+    cases: tuple[FilterCase, ...]
+    run: int
+    is_calibrated: bool
+    settings: InertialSettings
+
+
+def fly(flight: StudyFlight) -> list[CaseFlight]:
+    """Simulate a flight and replay it in each of its cases."""
+    first = flight.cases[0]
+    batch = simulate_family(first.family, 1, first.seed, first_run=flight.run)
+    return [
+        replay_flight(case, batch, 0, flight.is_calibrated and case.is_calibrated, flight.settings)
+        for case in flight.cases
+    ]
 
 
 def replay_flight(

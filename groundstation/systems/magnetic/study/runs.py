@@ -3,11 +3,7 @@
 A small outcome of each is kept.
 """
 
-import multiprocessing
-import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from groundstation.simulation.magnetic_family import MagneticFamilySettings, draw_magnetic_scenario
@@ -25,13 +21,12 @@ from groundstation.systems.magnetic.study.cases import (
 from groundstation.systems.magnetic.study.flights import Hangar, judged_outcome, wide_outcome
 from groundstation.systems.magnetic.study.judge import JudgedAnswer
 from groundstation.systems.magnetic.study.taxis import TaxiOutcome, taxi_cells, taxi_outcome
+from groundstation.systems.study import mapped
 
 Progress = Callable[[str], None]
 
 SWEPT_SHARE = 0.5  # of the seeds fly the sweeps: each seed is the same at every point, so that curves are smooth
 INCOMPLETE_SHARE = 0.25  # of the seeds fly incomplete figures, too: each of them is refused for a reason, not by chance
-POOLED_FROM = 8  # fewer seeds are done before other processes have started
-ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)
@@ -103,8 +98,8 @@ def run_jobs(jobs: Sequence[SeedJob], progress: Progress | None = None) -> tuple
     The outcomes are in the order of the jobs.
     """
     found = []
-    with _mapped(len(jobs)) as mapped:
-        for outcome in mapped(fly_job, jobs):
+    with mapped(len(jobs)) as each:
+        for outcome in each(fly_job, jobs):
             found.append(outcome)
             if progress:
                 progress(f"run {outcome.run}: {_told(outcome)}")
@@ -137,35 +132,3 @@ def _told(outcome: SeedOutcome) -> str:
     ]
     accepted = sum(flight.verdict == "accept" for flight in flights)
     return f"{accepted} of {len(flights)} flights accepted"
-
-
-@contextmanager
-def _mapped(
-    jobs: int,
-) -> Iterator[Callable[[Callable[[SeedJob], SeedOutcome], Sequence[SeedJob]], Iterator[SeedOutcome]]]:
-    """Return a map over jobs: in this process for a few, else in single-threaded processes."""
-    workers = min(jobs, os.cpu_count() or 1)
-    if jobs < POOLED_FROM or workers < 2:
-        yield map
-        return
-    with _environment(dict.fromkeys(ONE_THREAD, "1")):
-        pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
-        try:
-            yield pool.map
-        finally:
-            pool.shutdown(cancel_futures=True)
-
-
-@contextmanager
-def _environment(changes: dict[str, str]) -> Iterator[None]:
-    """Set environment variables for processes started meanwhile."""
-    before = {name: os.environ.get(name) for name in changes}
-    os.environ.update(changes)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
