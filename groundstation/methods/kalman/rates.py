@@ -4,6 +4,7 @@ Here are their transitions, and states carried forward by them.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -26,6 +27,7 @@ class Rates:
         for name in ("rows", "columns"):
             object.__setattr__(self, name, frozen(np.ascontiguousarray(getattr(self, name), dtype=np.int64)))
 
+    @cached_property
     def reach(self) -> tuple[Int64Array, Int64Array]:
         """Return rows and columns where I + A + ... + A^4 may have entries.
 
@@ -63,7 +65,7 @@ class Rates:
         """
         from groundstation.methods.kalman import series
 
-        rows, columns = self.reach()
+        rows, columns = self.reach
         entries = np.empty((len(seconds), len(rows)))
         given, over = (frozen(np.ascontiguousarray(part, dtype=np.float64)) for part in (values, seconds))
         scratch = np.empty((2, self.size, self.size))

@@ -17,12 +17,13 @@ import numpy as np
 from groundstation.base.records import frozen
 from groundstation.systems.inertial.coarse import Coarse
 from groundstation.systems.inertial.filter import ChannelsRun, Initial, initial_of, run_filter
-from groundstation.systems.inertial.leads import PAST_FROM_S, Path, built_up, past_mean, start_epochs
+from groundstation.systems.inertial.leads import PAST_FROM_S, Path, built_up, leads_of, past_mean, start_epochs
 from groundstation.systems.inertial.model import POSITION, FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.start_covariance import lead_growth
 
-JUDGED_S = (600.0, 1800.0, 3600.0)  # horizons at which finished outages tell the sets apart
+# Horizons at which finished outages tell the sets apart: multiples of the first
+JUDGED_S = (600.0, 1800.0, 3600.0)
 # Share of the logarithmic likelihood that counts: the horizons tell partly the same. Chosen on simulated flights
 TRUST = 0.6
 
@@ -78,28 +79,39 @@ class NoiseBank:
 
         Keyed by horizon.
         """
-        epochs, found = self.flown.epochs, {}
+        epochs = self.flown.epochs
+        found: dict[float, tuple[FloatArray, FloatArray]] = {}
         at = start_epochs(epochs, float(epochs.time_s[0]) + PAST_FROM_S, self.settings.start_step_s)
-        for lead_s in JUDGED_S if len(at) else ():  # a short flight has no past to judge by
+        if not len(at):  # a short flight has no past to judge by
+            return found
+        path = Path.of(self.flown, at, leads_of(JUDGED_S[0], JUDGED_S[-1]), self.settings.forecast_step_s)
+        starts = self.starts(path.start_s)
+        means = self._means(path, starts)
+        for lead_s in JUDGED_S:
             leads = np.array([lead_s])
-            path = Path.of(self.flown, at, leads, self.settings.forecast_step_s)
-            means, variances = self._each(path)
-            variances += lead_growth(self.flown, leads).judge_m2[None, None, :, None]
-            error = means - built_up(epochs, at, leads)
+            variances = self._variances(leads, starts) + lead_growth(self.flown, leads).judge_m2[None, None, :, None]
+            error = means[:, :, [round(lead_s / JUDGED_S[0]) - 1]] - built_up(epochs, at, leads)
             likelihood = -0.5 * np.sum(np.square(error) / variances + np.log(variances), axis=(2, 3))
             found[lead_s] = (path.start_s, likelihood.T)
         return found
 
     def _each(self, path: Path) -> tuple[FloatArray, FloatArray]:
         """Mean and variance of every set, shapes (k, s, l, c)."""
-        means, variances = [], []
-        for run, start in zip(self.runs, self.starts(path.start_s), strict=True):
-            means.append(path.carried(run.model, "noise_bank", start.x))
-            growth = lead_growth(run, path.lead_s)
+        starts = self.starts(path.start_s)
+        return self._means(path, starts), self._variances(path.lead_s, starts)
+
+    def _means(self, path: Path, starts: list[Initial]) -> FloatArray:
+        pairs = zip(self.runs, starts, strict=True)
+        return np.stack([path.carried(run.model, "noise_bank", start.x) for run, start in pairs])
+
+    def _variances(self, lead_s: FloatArray, starts: list[Initial]) -> FloatArray:
+        variances = []
+        for run, start in zip(self.runs, starts, strict=True):
+            growth = lead_growth(run, lead_s)
             parts = [growth.variance(start.P[:, group]) for group in range(start.P.shape[1])]
             channels = range(start.x.shape[2])
             variances.append(np.stack([parts[min(channel, len(parts) - 1)] for channel in channels], axis=2))
-        return np.stack(means), np.stack(variances)
+        return np.stack(variances)
 
     def starts(self, start_s: FloatArray) -> list[Initial]:
         """Return the state of each set at some times, from nothing later, its position known.

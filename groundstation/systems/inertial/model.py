@@ -6,12 +6,14 @@ noise depends on which way is north.
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from groundstation.base.geodesy import SEMI_MAJOR_M, curvature_radii_m
+from groundstation.base.records import frozen
 
 FloatArray = NDArray[np.float64]
 Transition = Literal["exact", "first_order"]
@@ -24,6 +26,7 @@ FIRST_ORDER_STEP_S = 1.0  # I + A T gains 0.8e-6 of amplitude a second at this s
 
 GRAVITY_EQUATOR_MPS2, GRAVITY_POLE_FACTOR = 9.7803253359, 0.00193185265241  # WGS-84, Somigliana
 GRAVITY_ECCENTRICITY_SQUARED = 0.00669437999013
+KEPT_NOISES = 4096  # of the process noises made last: 288 bytes each, the same few are asked for again and again
 
 
 @overload
@@ -162,7 +165,7 @@ class ChannelModel:
         return out
 
     def process_noise_over(self, seconds: float, density: FloatArray) -> FloatArray:
-        """Covariance that white noise adds over a time, shape (6, 6).
+        """Covariance that white noise adds over a time, shape (6, 6), read-only.
 
         Parameters
         ----------
@@ -172,12 +175,18 @@ class ChannelModel:
 
         Simpson's rule over steps of at most :data:`LONGEST_STEP_S`.
         """
-        steps = max(1, math.ceil(seconds / LONGEST_STEP_S - 1e-9))
-        step = seconds / steps
-        whole, half = self.transition_over(step), self.transition_over(0.5 * step)
-        noise = np.diag(density)
-        once = step / 6.0 * (noise + 4.0 * half @ noise @ half.T + whole @ noise @ whole.T)
-        total = once
-        for _ in range(steps - 1):
-            total = whole @ total @ whole.T + once
-        return np.asarray(0.5 * (total + total.T))
+        return _noise_over(self, float(seconds), tuple(np.asarray(density).tolist()))
+
+
+@lru_cache(KEPT_NOISES)
+def _noise_over(model: ChannelModel, seconds: float, density: tuple[float, ...]) -> FloatArray:
+    """Return what :meth:`ChannelModel.process_noise_over` says."""
+    steps = max(1, math.ceil(seconds / LONGEST_STEP_S - 1e-9))
+    step = seconds / steps
+    whole, half = model.transition_over(step), model.transition_over(0.5 * step)
+    noise = np.diag(density)
+    once = step / 6.0 * (noise + 4.0 * half @ noise @ half.T + whole @ noise @ whole.T)
+    total = once
+    for _ in range(steps - 1):
+        total = whole @ total @ whole.T + once
+    return frozen(0.5 * (total + total.T))

@@ -8,18 +8,20 @@ oscillation, which P alone knows nothing of.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from groundstation.base.records import Int64Array
+from groundstation.base.records import Int64Array, frozen
 from groundstation.methods.kalman.smoother import lag_covariances
 from groundstation.systems.inertial.filter import ChannelsRun
-from groundstation.systems.inertial.model import POSITION, SIZE, FloatArray
+from groundstation.systems.inertial.model import POSITION, SIZE, ChannelModel, FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.starts import windows_of
 
 WINDOW_METHODS = ("windows", "drift_windows", "consistent_windows")
 WITH_COVARIANCE = ("last_estimate", *WINDOW_METHODS, "smoothed_start")
+KEPT_GROWTHS = 256  # made last: every set of a bank asks for its own several times
 LAG_STEP_S = 50.0  # of the double sum over a window; the covariance of the estimates changes little over it
 
 
@@ -76,27 +78,35 @@ def _windowed(method: str, run: ChannelsRun, at: Int64Array, channel: int, setti
     lengths_s = windows_of(method, settings).lengths_s
     lags = np.arange(0.0, min(max(lengths_s), float(np.ptp(time_s))) + 1e-9, LAG_STEP_S)
     phi = np.stack([run.model.transition_over(float(lag)) for lag in lags])
-    later = np.abs(np.arange(len(lags))[:, None] - np.arange(len(lags))[None, :])
+    source = np.searchsorted(time_s, time_s[at][:, None] - lags + 1e-6, side="right") - 1
+    counts = (source >= 0).sum(axis=1)
     out = np.array(P[at])
-    for row, epoch in enumerate(at):
-        source = np.searchsorted(time_s, time_s[epoch] - lags + 1e-6, side="right") - 1
-        count = int((source >= 0).sum())
-        weights = _weights(lags[:count], lengths_s)
-        V = (
-            np.einsum("ji,ik->jik", weights, np.eye(SIZE))
-            if method != "consistent_windows"
-            else weights[:, :, None] * phi[:count]
-        )
-        V = V - np.where(np.arange(count) == 0, 1.0, 0.0)[:, None, None] * np.eye(SIZE)
-        D = known[source[:count]]
-        # C[j, k] = D(older of the two) carried to the younger; older has the greater lag
-        older = np.maximum(np.arange(count)[:, None], np.arange(count)[None, :])
-        carried = phi[later[:count, :count]]
-        is_first_older = np.arange(count)[:, None] >= np.arange(count)[None, :]
-        forward = np.einsum("jkab,jkbc->jkac", carried, D[older], optimize=True)
-        C = np.where(is_first_older[:, :, None, None], np.swapaxes(forward, 2, 3), forward)
-        out[row] += np.einsum("jab,jkbc,kdc->ad", V, C, V, optimize=True)
+    for count in np.unique(counts):
+        V, younger = _window_factors(method, lags[:count], phi[:count], lengths_s)
+        rows = np.flatnonzero(counts == count)
+        own, mixed = (np.zeros((len(rows), SIZE, SIZE)) for _ in range(2))
+        for lag in range(count):
+            D = known[source[rows, lag]]
+            own += V[lag] @ D @ V[lag].T
+            mixed += younger[lag] @ D @ V[lag].T
+        out[rows] += own + mixed + np.swapaxes(mixed, 1, 2)
     return out
+
+
+def _window_factors(
+    method: str, lags: FloatArray, phi: FloatArray, lengths_s: tuple[float, ...]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the factors of the estimate at each lag in d, and in what younger ones share with it.
+
+    Both have the shape (lags, 6, 6). An estimate is correlated with a younger one as with itself carried to it.
+    """
+    weights = _weights(lags, lengths_s)
+    V = weights[:, :, None] * (phi if method == "consistent_windows" else np.eye(SIZE))
+    V[0] -= np.eye(SIZE)
+    younger = np.zeros_like(V)
+    for lag in range(1, len(lags)):
+        younger[lag] = (V[:lag] @ phi[lag:0:-1]).sum(axis=0)
+    return V, younger
 
 
 def _weights(lags: FloatArray, lengths_s: tuple[float, ...]) -> FloatArray:
@@ -134,14 +144,21 @@ def lead_growth(run: ChannelsRun, lead_s: FloatArray) -> LeadGrowth:
     Source: the model; errors of GNSS at the two ends are correlated as the noise of the class says.
     """
     gnss = run.noise.gnss
-    rows, added = np.zeros((len(lead_s), SIZE)), np.zeros(len(lead_s))
-    if len(lead_s):
-        phi = run.model.transition_over(float(lead_s[0]))
-        once = run.model.process_noise_over(float(lead_s[0]), run.noise.densities())
-        carried, noise = np.eye(SIZE), np.zeros((SIZE, SIZE))
-        for lead in range(len(lead_s)):
-            carried, noise = phi @ carried, phi @ noise @ phi.T + once
-            rows[lead], added[lead] = carried[POSITION], noise[POSITION, POSITION]
+    first_s = float(lead_s[0]) if len(lead_s) else 0.0
+    rows, added = _grown(run.model, tuple(run.noise.densities().tolist()), first_s, len(lead_s))
     decay = np.exp(-np.asarray(lead_s) / max(gnss.position_correlation_s, 1e-9))
     ends = 2.0 * (gnss.position_white_m**2 + gnss.position_correlated_m**2 * (1.0 - decay))
     return LeadGrowth(rows, added, ends)
+
+
+@lru_cache(KEPT_GROWTHS)
+def _grown(model: ChannelModel, density: tuple[float, ...], step_s: float, leads: int) -> tuple[FloatArray, FloatArray]:
+    """Return rows (l, 6) of Phi and variances (l,) added by noise, over leads in equal steps; both read-only."""
+    rows, added = np.zeros((leads, SIZE)), np.zeros(leads)
+    phi = model.transition_over(step_s)
+    once = model.process_noise_over(step_s, np.array(density))
+    carried, noise = np.eye(SIZE), np.zeros((SIZE, SIZE))
+    for lead in range(leads):
+        carried, noise = phi @ carried, phi @ noise @ phi.T + once
+        rows[lead], added[lead] = carried[POSITION], noise[POSITION, POSITION]
+    return frozen(rows), frozen(added)

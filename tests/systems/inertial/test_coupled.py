@@ -224,7 +224,7 @@ def test_exponential_of_the_filter_is_the_exponential() -> None:
     values = coupled.coupled_values(motion, BETA)[:1]
     transition = coupled.RATES.transition(values, np.array([10.0]), np.zeros(coupled.SIZE))
     E = np.eye(coupled.SIZE)
-    E[coupled.RATES.reach()] = transition.dynamics.F[0]
+    E[coupled.RATES.reach] = transition.dynamics.F[0]
     exact, term = np.eye(coupled.SIZE), np.eye(coupled.SIZE)
     for order in range(1, 12):
         term = term @ coupled.coupled_matrix(motion, BETA)[0] * 10.0 / order

@@ -30,8 +30,13 @@ from groundstation.systems.inertial.model import (
     ChannelModel,
 )
 from groundstation.systems.inertial.settings import InertialSettings
-from groundstation.systems.inertial.start_covariance import WITH_COVARIANCE, start_covariance
-from groundstation.systems.inertial.starts import start_states
+from groundstation.systems.inertial.start_covariance import (
+    LAG_STEP_S,
+    WINDOW_METHODS,
+    WITH_COVARIANCE,
+    start_covariance,
+)
+from groundstation.systems.inertial.starts import start_states, windows_of
 from groundstation.systems.inertial.study.consistency import consistency_table, matched_run
 
 MODEL = ChannelModel(MPS2_PER_G, RADIUS_M, 1.0 / 3600.0)
@@ -362,6 +367,36 @@ def test_a_filter_told_too_little_noise_is_not_consistent() -> None:
     run = run_filter(matched.run.epochs, matched.run.model, noise)
     ratio = np.square(run.innovation[:, 0]) / run.innovation_variance[:, 0]
     assert np.mean(ratio) > chi2.ppf(1.0 - TAIL, ratio.size) / ratio.size
+
+
+@pytest.mark.parametrize("method", WINDOW_METHODS)
+def test_covariance_of_a_window_is_the_sum_over_all_pairs_of_lags(method: str) -> None:
+    """The younger of two estimates is correlated with the older one as with that carried to it."""
+    settings, run = InertialSettings(), matched_run(NEES_SEED, 0, duration_s=4000).run
+    at, lengths_s = np.array([70, 1300, 3900]), windows_of(method, settings).lengths_s
+    known = run.covariance_without_data - run.covariance(0)
+    found = start_covariance(method, run, at, 0, settings)
+    for row, epoch in enumerate(at.tolist()):
+        lags = np.arange(0.0, min(epoch, max(lengths_s)) + 1e-9, LAG_STEP_S)
+        phi = [run.model.transition_over(float(lag)) for lag in lags]
+        share = [np.sum(lags[:, None] < np.maximum(lengths_s, 1e-9), axis=0), np.maximum(lengths_s, 1e-9)]
+        V = []
+        for place, lag in enumerate(lags):
+            mean = np.where(lag < share[1], 1.0 / share[0], 0.0)[:, None] * np.eye(SIZE)
+            if method == "consistent_windows":
+                mean = mean @ phi[place]
+            V.append(mean - np.eye(SIZE) * (place == 0))
+        expected = np.array(run.covariance(0)[epoch])
+        for younger in range(len(lags)):
+            for older in range(younger, len(lags)):
+                shared = phi[older - younger] @ known[round(epoch - lags[older])]
+                part = V[younger] @ shared @ V[older].T
+                expected += part if older == younger else part + part.T
+        expected[POSITION] = expected[:, POSITION] = 0.0
+        sigma = np.sqrt(np.diag(expected))[VELOCITY:]
+        off = (found[row] - expected)[VELOCITY:, VELOCITY:] / np.outer(sigma, sigma)
+        assert np.max(np.abs(off)) < 1e-12
+        assert not found[row][POSITION].any()
 
 
 @pytest.mark.slow

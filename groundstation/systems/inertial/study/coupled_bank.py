@@ -108,6 +108,7 @@ def set_forecasts(
     coarse = Coarse.of(flown)
     short = coarse_differences(differences, coarse)
     runs = [run_coupled(short, coarse.noise(noise), settings, every=1) for noise in flown.noise.bank.sets(flown.noise)]
+    noises = [noise_of(run.noise, run.differences, run.epochs, 0.0)[1] for run in runs]
     shape = (len(runs), len(replay.start_s), LEADS, 2)
     mean, variance = np.zeros(shape), np.zeros(shape)
     last = np.maximum(np.searchsorted(coarse.end_s, replay.start_s + 1e-6, side="right") - 1, 0)
@@ -117,14 +118,16 @@ def set_forecasts(
             _values(differences, start_s + step_s * np.arange(round(LEADS * LEAD_STEP_S / step_s) + 1.0), flown)
             for step_s in (STEP_S, VARIANCE_STEP_S)
         ]
-        for place, run in enumerate(runs):
-            x, P = _at_start(run, differences, int(epoch), float(start_s))
+        seconds = float(start_s) - float(coarse.epochs.time_s[epoch])
+        since = _values(differences, np.array([start_s - seconds, start_s]), flown) if seconds > 1e-6 else None
+        for place, (run, densities) in enumerate(zip(runs, noises, strict=True)):
+            x, P = _at_start(run, int(epoch), since, seconds, densities)
             x[PLACES], P[PLACES], P[:, PLACES] = known, 0.0, 0.0
             for values in paths:
                 values[:, DECAYS] = -run.noise.beta_per_s
             carried = RATES.carried(paths[0], STEP_S, round(LEAD_STEP_S / STEP_S), x)
             mean[place, start] = carried[:, PLACES] - known
-            variance[place, start] = _grown(run, paths[1], P)
+            variance[place, start] = _grown(run, paths[1], P, densities)
     return SetForecasts(mean, variance)
 
 
@@ -134,34 +137,28 @@ def _values(differences: InsDifferences, time_s: FloatArray, flown: ChannelsRun)
 
 
 def _at_start(
-    run: CoupledRun, differences: InsDifferences, epoch: int, start_s: float
+    run: CoupledRun, epoch: int, since: FloatArray | None, seconds: float, densities: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the state of a set at an epoch, carried to a start.
+    """Return the state of a set at an epoch, carried to a start so many seconds later.
 
-    The start is less than a coarse epoch later.
+    ``since``, shape (1, 41), are the entries of A from the epoch to the start, None where it begins at the epoch.
     """
     x, P = np.array(run.x[epoch]), np.array(run.P[epoch])
-    seconds = start_s - float(run.epochs.time_s[epoch])
-    if seconds > 1e-6:
-        times = np.array([start_s - seconds, start_s])
-        motion = CraftMotion.between(differences, times, is_strapdown=run.noise.is_strapdown)
+    if since is not None:
+        since[:, DECAYS] = -run.noise.beta_per_s
         A = np.zeros((SIZE, SIZE))
-        A[ROWS, COLUMNS] = coupled_values(motion, run.noise.beta_per_s)[0] * seconds
+        A[ROWS, COLUMNS] = since[0] * seconds
         phi = np.eye(SIZE) + A + 0.5 * A @ A
-        x, P = phi @ x, phi @ P @ phi.T + np.diag(_densities(run)) * seconds
+        x, P = phi @ x, phi @ P @ phi.T + np.diag(densities) * seconds
     return x, P
 
 
-def _densities(run: CoupledRun) -> FloatArray:
-    return noise_of(run.noise, run.differences, run.epochs, 0.0)[1]
-
-
-def _grown(run: CoupledRun, values: FloatArray, P: FloatArray) -> FloatArray:
+def _grown(run: CoupledRun, values: FloatArray, P: FloatArray, densities: FloatArray) -> FloatArray:
     """Return the variance of the position at the leads, shape (l, 2)."""
     nothing = np.zeros(0, np.int64)
     unseen = kalman.Measurements(nothing, np.zeros((0, 0)), nothing, lines_of(run.epochs, run.noise))
     carried = kalman.run_filter(
-        RATES.transition(values, np.full(len(values), VARIANCE_STEP_S), _densities(run)),
+        RATES.transition(values, np.full(len(values), VARIANCE_STEP_S), densities),
         np.arange(len(values)),
         unseen,
         kalman.Start(np.zeros((SIZE, 0)), P),
