@@ -41,6 +41,19 @@ def clock_text(seconds: float) -> str:
     return f"{hours}:{tail}" if hours else tail
 
 
+def tenths_text(seconds: float) -> str:
+    """Return a time as minutes, seconds and tenths; it has no sign.
+
+    Examples
+    --------
+    >>> tenths_text(77.61), tenths_text(3725.96)
+    ('1:17.6', '1:02:06.0')
+    """
+    tenths = round(abs(seconds) * 10.0)
+    whole, rest = divmod(tenths, 10)
+    return f"{clock_text(float(whole))}.{rest}"
+
+
 def span_text(span_s: tuple[float, float], whole_s: tuple[float, float]) -> str:
     """Return the time of a span within a whole one.
 

@@ -40,13 +40,19 @@ Remedies = tuple[tuple[str, tuple[NextLine, str]], ...]
 class Advice(NamedTuple):
     """Advice for the next flight: its line, its text, and what it is for, empty where for all.
 
-    What keeps an answer from being used is pressing: it stands before what would give a missing one.
+    What keeps an answer from being used is pressing: it stands before what would give a missing one. What a danger asks
+    for stands before all.
     """
 
     line: NextLine
     text: str
     purpose: str
     is_pressing: bool = False
+    is_danger: bool = False
+
+
+def _nothing_withheld(_results: FlightResults) -> tuple[str, ...]:
+    return ()
 
 
 def _no_advice(_results: FlightResults) -> tuple[Advice, ...]:
@@ -54,10 +60,14 @@ def _no_advice(_results: FlightResults) -> tuple[Advice, ...]:
 
 
 class Adviser(NamedTuple):
-    """Advice of a system: remedies of missing answers, and what would better those there are."""
+    """Advice of a system: remedies of missing answers, and what would better those there are.
+
+    ``withheld`` are words of advice that the aircraft of these results cannot follow, of whichever system it is.
+    """
 
     remedies: Remedies = ()
     advise: Callable[[FlightResults], Iterable[Advice]] = _no_advice
+    withheld: Callable[[FlightResults], tuple[str, ...]] = _nothing_withheld
 
 
 class Chapters(NamedTuple):

@@ -28,15 +28,24 @@ LOST = "the recorder: data were lost"
 
 
 def next_steps(results: FlightResults, chapters: Chapters) -> Section | None:
-    """Return the chapter in at most three lines; None where nothing is left to advise."""
+    """Return the chapter in at most three lines; None where nothing is left to advise.
+
+    The line that a danger asks for comes first.
+    """
     lines: dict[str, dict[str, list[str]]] = {line: {} for line in LINES}
-    for line, text, purpose, _ in _advice(results, chapters):
+    withheld = [word for one in chapters.advisers for word in one.withheld(results)]
+    danger = ""
+    for line, text, purpose, _, is_danger in _advice(results, chapters):
+        if any(word in text for word in withheld):
+            continue
+        danger = danger or (line if is_danger else "")
         texts = lines[line]
         if text in texts and purpose not in texts[text]:
             texts[text].append(purpose)
         elif len(texts) < MOST_OF_A_LINE:
             texts.setdefault(text, [purpose])
-    pairs = [(line, _told(texts), "") for line, texts in lines.items() if texts]
+    order = sorted(LINES, key=lambda line: line != danger)
+    pairs = [(line, _told(lines[line]), "") for line in order if lines[line]]
     return Section("next", TITLE, LEAD, (Facts("", pairs),)) if pairs else None
 
 
@@ -52,7 +61,8 @@ def _told(texts: dict[str, list[str]]) -> str:
 def _advice(results: FlightResults, chapters: Chapters) -> Iterator[Advice]:
     """Yield the advice, the most pressing first."""
     given = [advice for one in chapters.advisers for advice in one.advise(results)]
-    yield from (advice for advice in given if advice.is_pressing)
+    yield from (advice for advice in given if advice.is_danger)
+    yield from (advice for advice in given if advice.is_pressing and not advice.is_danger)
     remedies = [*(remedy for one in chapters.advisers for remedy in one.remedies), *BY_REASON]
     for one in results.not_assessable:
         purpose = chapters.titles.get(one.analysis, one.analysis)

@@ -3,7 +3,7 @@
 Every check of the log's own record, and the flight in a sentence.
 """
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.results.answer import Answers, answer_of
 from groundstation.systems.analysis import Analysis, Found, Shortfall
-from groundstation.systems.health.answer import HEADLINES, AutopilotHealth, Check, Happening
+from groundstation.systems.health.answer import HEADLINES, AttitudeLoss, AutopilotHealth, Check, Happening
 from groundstation.systems.health.columns import COLUMNS
 from groundstation.systems.health.settings import HealthSettings
 from groundstation.systems.known import Known
@@ -21,11 +21,13 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from groundstation.systems.health.checks import Judged
-    from groundstation.systems.health.evidence import Event, Evidence, Spans
+    from groundstation.systems.health.evidence import Event, Evidence, FloatArray, Spans
+    from groundstation.systems.health.motors import Motors
     from groundstation.systems.health.parameters import Settings
     from groundstation.tables.table import Flight
 
 CODE = "health"
+RED = 2  # grade of a sample
 
 
 class _Checked(NamedTuple):
@@ -37,12 +39,16 @@ class _Checked(NamedTuple):
     judged: "tuple[Judged, ...]"
     events: "tuple[Event, ...]"
     stated: "Settings"
+    loss: AttitudeLoss | None
+    motors: "Motors | None"
+    pauses_s: "tuple[FloatArray, FloatArray]"
 
 
 def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[AutopilotHealth]:
     from groundstation.systems.health import messages
     from groundstation.systems.health.checks import verdict_of
-    from groundstation.systems.health.figures import lanes_figure, series_figure
+    from groundstation.systems.health.figures import lanes_figure, motors_figure, series_figure
+    from groundstation.systems.health.motors import cannot_taxi
     from groundstation.systems.health.sentence import told
     from groundstation.tables.estimator_in_use import estimator_in_use
 
@@ -52,7 +58,7 @@ def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[Auto
     listed = _listed(happenings, settings.most_messages)
     answer = AutopilotHealth(
         verdict=verdict_of(found.checks),
-        sentence=told(found.checks),
+        sentence=told(found.checks, found.loss),
         autopilot=found.autopilot,
         judged_over=found.air.words,
         judged_by=found.air.method,
@@ -66,10 +72,13 @@ def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[Auto
         differing=found.stated.differing,
         estimator="" if used is None else used.name,
         estimator_source="" if used is None else used.source,
+        loss=found.loss,
+        cannot_taxi=cannot_taxi(flight),
         settings=_stated(settings),
         figures=(
-            lanes_figure(found.judged, happenings, flight.duration_s),
+            lanes_figure(found.judged, happenings, flight.duration_s, found.pauses_s),
             series_figure(found.judged),
+            *(() if found.loss is None or found.motors is None else (motors_figure(flight, found.motors, found.loss),)),
         ),
     )
     return Found(answer, (*(_finding(one) for one in found.checks if one.is_bad), *messages.findings(flight)))
@@ -113,12 +122,38 @@ def _read(flight: "Flight", known: Known) -> _Read:
 
 def _checked(flight: "Flight", known: Known, settings: HealthSettings) -> _Checked:
     """Judge the flight; raises as :func:`_read`."""
-    from groundstation.systems.health.checks import judge
+    from groundstation.systems.health.batteries import with_batteries
+    from groundstation.systems.health.checks import judge, pauses
     from groundstation.systems.health.limits import thresholds
 
     found = _read(flight, known)
     checks, judged = judge(flight, found.evidence, found.events, found.air, thresholds(settings.thresholds))
-    return _Checked(found.autopilot, found.air, checks, judged, found.events, found.stated)
+    loss, motors = _loss(flight, judged)
+    lost_s = None if loss is None else loss.start_s
+    told = []
+    for one in checks:
+        if one.key == "tracking" and loss is not None and loss.told:
+            told.append(replace(one, reason=f"{one.reason}; {loss.told}"))
+        else:
+            told.append(with_batteries(one, judged, lost_s) if one.key == "battery" else one)
+    start_ns, end_ns = pauses(found.evidence)
+    quiet = (flight.seconds(start_ns), flight.seconds(end_ns))
+    return _Checked(found.autopilot, found.air, tuple(told), judged, found.events, found.stated, loss, motors, quiet)
+
+
+def _loss(flight: "Flight", judged: "Sequence[Judged]") -> "tuple[AttitudeLoss | None, Motors | None]":
+    """Return the first loss of control of attitude that failed its check, and the motors' outputs."""
+    from groundstation.systems.health.motors import at_the_loss, motors_of
+    from groundstation.systems.health.sentence import LOST
+
+    lost = [one for one in judged if one.measure.quantity == LOST and one.measure.verdict == "fail"]
+    if not lost:
+        return None, None
+    rows = np.flatnonzero((lost[0].grade >= RED) & lost[0].in_air)
+    if not len(rows):
+        return None, None
+    motors = motors_of(flight)
+    return at_the_loss(flight, motors, int(lost[0].evidence.time_ns[rows[0]])), motors
 
 
 def _examine(flight: "Flight", known: Known, _settings: HealthSettings) -> tuple[Shortfall, ...]:

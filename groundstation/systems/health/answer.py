@@ -32,13 +32,14 @@ class Measure:
     check, quantity, title, sensor, source, unit : str
         Keys of check and threshold, what it is and which of several, topic and field.
     verdict : {'pass', 'warn', 'fail', 'not_logged'}
-        ``not_logged`` where it is logged, but not in the air.
+        ``not_logged`` where it is logged, but not in the air, or has no limit.
     rule : {'share', 'median', 'mean', 'rise'}
         What of it the limits judge.
     figure : float or None
         Worst value in the air, median, mean over time, or rise of a counter.
     worst, worst_at_s : float
-        Worst value in the air (of the log where it is not logged there) and its flight time.
+        Worst value in the air (of the log where it is not logged there) and its flight time. Of a limit that must be
+        passed for some time, the worst value that was.
     median : float or None
         Of the samples in the air.
     mean : float or None
@@ -93,6 +94,11 @@ class Measure:
         return f"{self.title} ({self.sensor})" if self.sensor else self.title
 
     @property
+    def is_unjudged(self) -> bool:
+        """Tell whether it is logged in the air, and has no limit."""
+        return self.amber is None and self.red is None and self.logged_share > 0.0
+
+    @property
     def gravity(self) -> tuple[float, float, float]:
         """Shares that are red and amber, then how much of its first limit the figure is."""
         limit = self.amber if self.amber is not None else self.red
@@ -139,6 +145,17 @@ class Check(Brief):
     measures: tuple[Measure, ...]
     events_in_air: int = 0
     first_event_s: float | None = None
+
+    @property
+    def is_told(self) -> bool:
+        """Tell whether it has a verdict, or values in the air that no limit judges."""
+        return self.verdict != "not_logged" or any(one.is_unjudged for one in self.measures)
+
+    @property
+    def begins_s(self) -> float | None:
+        """Start of what is told of it: its first event, else its worst span."""
+        measure = self.decisive
+        return self.first_event_s if self.first_event_s is not None or measure is None else measure.span_start_s
 
     @property
     def is_bad(self) -> bool:
@@ -199,13 +216,79 @@ class ChangedParameter:
 
 
 @dataclass(frozen=True)
+class MotorOutput:
+    """Output to one motor in the time judged after control of attitude was lost.
+
+    Parameters
+    ----------
+    number : int
+        Of the output, from 1.
+    low, high : float
+        What it may be at least and at most in flight.
+    mean : float
+    thrust : float
+        Mean thrust commanded, of the greatest: 0 to 1.
+    at_low_s, at_high_s : float
+        How long it stood at its lowest and at its highest.
+    """
+
+    number: int
+    low: float
+    high: float
+    mean: float
+    thrust: float
+    at_low_s: float
+    at_high_s: float
+
+
+@dataclass(frozen=True)
+class AttitudeLoss:
+    """Loss of control of attitude, and what the motors of a multirotor were commanded then.
+
+    ``motors`` is empty where they are not logged, or fewer than four. ``suspect`` is the output whose motor, ESC or
+    propeller is suspect, None without one; ``all_full``: every motor was near its greatest thrust.
+    """
+
+    start_s: float
+    judged_s: float = 0.0
+    unit: str = ""
+    source: str = ""
+    motors: tuple[MotorOutput, ...] = ()
+    suspect: int | None = None
+    all_full: bool = False
+
+    @property
+    def told(self) -> str:
+        """Highest and lowest output with their limits, and what they point to; empty without outputs."""
+        if not self.motors:
+            return ""
+        highest = max(self.motors, key=lambda one: one.thrust)
+        lowest = min(self.motors, key=lambda one: one.thrust)
+        if self.all_full:
+            return "all motors near full thrust: too little thrust or a weak battery, no single motor suspect"
+        shown = f"{self._stood(highest, is_high=True)}, {self._stood(lowest, is_high=False)}"
+        if self.suspect is None:
+            return f"{shown}: no single motor suspect"
+        return f"{shown}: suspect motor, ESC or propeller of output {self.suspect}"
+
+    def _stood(self, one: MotorOutput, *, is_high: bool) -> str:
+        limit, at_s = (one.high, one.at_high_s) if is_high else (one.low, one.at_low_s)
+        end = "highest" if is_high else "lowest"
+        unit = f" {self.unit}" if self.unit else ""
+        if at_s >= 0.5 * self.judged_s:
+            return f"output {one.number} at its {end} ({limit:.4g}{unit}) for {at_s:.1f} of {self.judged_s:.1f} s"
+        return f"output {one.number} {end} (mean {one.mean:.4g}{unit}, limit {limit:.4g}{unit})"
+
+
+@dataclass(frozen=True)
 class AutopilotHealth(Answer):
     """Health of the autopilot of a flight.
 
     ``verdict`` is the worst of the checks, ``sentence`` a person's summary; ``judged_over`` says over which time
     (in the air, while armed, in the whole log) and ``judged_by`` what showed it, ``judged_s`` its length.
     ``differing`` are the parameters off their defaults, where the log tells defaults (``has_defaults``); ``estimator``
-    flew the aircraft, empty where the log does not tell it.
+    flew the aircraft, empty where the log does not tell it. ``loss`` is the first loss of control of attitude, None
+    without one; ``cannot_taxi`` tells that the log is of a multirotor or helicopter.
     """
 
     analysis: ClassVar[str] = "health"
@@ -225,6 +308,8 @@ class AutopilotHealth(Answer):
     differing: tuple[ChangedParameter, ...] = ()
     estimator: str = ""
     estimator_source: str = ""
+    loss: AttitudeLoss | None = None
+    cannot_taxi: bool = False
     settings: dict[str, Any] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
 

@@ -26,6 +26,7 @@ from groundstation.systems.health.logged import (
     latest,
     named,
 )
+from groundstation.systems.health.motors import FULL, OUTPUTS, at_limit, motors_of
 from groundstation.tables.parameters import Parameters, parameters_of
 from groundstation.tables.table import Flight
 
@@ -34,9 +35,7 @@ LEAST_VOLT = 2.0  # a battery that is never above it is none
 STEPS_PER_DB = 1.9
 # Modes without a setpoint of attitude: MANUAL, TRAINING, ACRO, INITIALISING, QACRO of planes; ACRO, FLIP of copters.
 FREE = {"plane": (0.0, 3.0, 4.0, 16.0, 23.0), "copter": (1.0, 14.0)}
-MOTORS, SURFACES = (*range(33, 41), *range(82, 86)), (4, 19, 21, 24, 25, 77, 78, 79, 80, 86, 87)
-OUTPUTS = 16
-FULL = 0.98  # of the travel, where an output counts as at its end
+SURFACES = (4, 19, 21, 24, 25, 77, 78, 79, 80, 86, 87)
 DEFAULT_CAPACITY_MAH = 3300.0
 
 
@@ -48,6 +47,11 @@ def battery(flight: Flight) -> Iterator[Evidence]:
         if field:
             volt = table.values(field) * (0.01 if is_integer(table, field) else 1.0)
             yield from voltage(f"{table.topic}.{field}", table.time_ns, volt, instance, parameters)
+            yield from used("battery_v", f"{table.topic}.{field}", table.time_ns, volt, instance)
+        field = named(table, "Curr")
+        if field:
+            ampere = table.values(field) * (0.01 if is_integer(table, field) else 1.0)
+            yield from used("battery_a", f"{table.topic}.{field}", table.time_ns, ampere, instance)
         if is_number(table, "RemPct") and parameters.value(_prefix(instance) + "CAPACITY") != DEFAULT_CAPACITY_MAH:
             left = table.values("RemPct")
             left = np.where(left <= 100.0, left / 100.0, np.nan)
@@ -62,6 +66,15 @@ def battery(flight: Flight) -> Iterator[Evidence]:
             if np.isfinite(volt).any():
                 yield from supply(f"{topic}.Vcc", table.time_ns, volt)
                 return
+
+
+def used(quantity: str, source: str, time_ns: Int64Array, value: FloatArray, instance: int) -> Iterator[Evidence]:
+    """Yield voltage or current of a battery as they are; of one that has no current or a few volts nothing."""
+    is_volt = quantity == "battery_v"
+    value = np.where(value > (LEAST_VOLT if is_volt else -1.0), value, np.nan)
+    if np.any(value > 0.0):
+        unit = "V" if is_volt else "A"
+        yield Evidence("battery", quantity, f"battery {instance + 1}", source, unit, time_ns, value, instance)
 
 
 def _prefix(instance: int) -> str:
@@ -164,35 +177,31 @@ def _is_held(flight: Flight, time_ns: Int64Array) -> BoolArray:
 
 
 def saturation(flight: Flight) -> Iterator[Evidence]:
-    """Yield 1 where a motor is at full, or a surface at an end of its travel.
+    """Yield 1 where a motor is at a limit of its output, or a surface at an end of its travel.
 
     What an output does, and its ends, stand in the parameters: without them nothing is said.
     """
-    parameters = parameters_of(flight)
     if "raw.RCOU" not in flight:
         return
-    table = flight["raw.RCOU"]
-    found: dict[str, list[FloatArray]] = {"motors": [], "surfaces": []}
-    sources: dict[str, list[str]] = {"motors": [], "surfaces": []}
+    table, parameters = flight["raw.RCOU"], parameters_of(flight)
+    motors = motors_of(flight)
+    if motors is not None:
+        source = f"raw.RCOU, outputs {', '.join(str(one.number) for one in motors.each)}"
+        yield Evidence("saturation", "output_full", "motors", source, "", table.time_ns, at_limit(motors))
+    found: list[FloatArray] = []
+    fields: list[str] = []
     for number in range(1, OUTPUTS + 1):
         field = named(table, f"C{number}", f"Ch{number}", f"Chan{number}")
-        kind = _kind(parameters, number)
-        ends = _ends(parameters, number)
-        if not field or not kind or ends is None:
-            continue
-        pulse, (low, high) = table.values(field), ends
-        pulse = np.where((pulse > 500.0) & (pulse < 2500.0), pulse, np.nan)
-        share = (pulse - low) / (high - low)
-        is_full = share >= FULL
-        if kind == "surfaces":
-            is_full |= share <= 1.0 - FULL
-        found[kind].append(np.where(np.isfinite(share), is_full, np.nan))
-        sources[kind].append(field)
-    for name, each in found.items():
-        if each:
-            value = _any(np.stack(each))
-            source = f"raw.RCOU.{', '.join(sources[name])}"
-            yield Evidence("saturation", "output_full", name, source, "", table.time_ns, value)
+        ends = _ends_of_surface(parameters, number)
+        if field and ends is not None:
+            pulse, (low, high) = table.values(field), ends
+            pulse = np.where((pulse > 500.0) & (pulse < 2500.0), pulse, np.nan)
+            share = (pulse - low) / (high - low)
+            found.append(np.where(np.isfinite(share), (share >= FULL) | (share <= 1.0 - FULL), np.nan))
+            fields.append(field)
+    if found:
+        source = f"raw.RCOU.{', '.join(fields)}"
+        yield Evidence("saturation", "output_full", "surfaces", source, "", table.time_ns, _any(np.stack(found)))
 
 
 def _any(values: FloatArray) -> FloatArray:
@@ -201,20 +210,10 @@ def _any(values: FloatArray) -> FloatArray:
     return np.where(known.any(axis=0), np.max(np.where(known, values, 0.0), axis=0), np.nan)
 
 
-def _kind(parameters: Parameters, number: int) -> str:
+def _ends_of_surface(parameters: Parameters, number: int) -> tuple[float, float] | None:
+    """Return the ends of an output to a surface; None of any other."""
     function = parameters.value(f"SERVO{number}_FUNCTION", f"RC{number}_FUNCTION")
-    if function is not None and int(function) in MOTORS:
-        return "motors"
-    return "surfaces" if function is not None and int(function) in SURFACES else ""
-
-
-def _ends(parameters: Parameters, number: int) -> tuple[float, float] | None:
-    """Return the ends of an output: those of motors where it is one, else its own."""
-    if _kind(parameters, number) == "motors":
-        low, high = parameters.value("MOT_PWM_MIN"), parameters.value("MOT_PWM_MAX")
-        if low and high and high > low:
-            return low, high
-        low, high = parameters.value("RC3_MIN"), parameters.value("RC3_MAX")  # MOT_PWM_MAX = 0: those of the throttle
-        return (low, high) if low and high and high > low else None
     low, high = (parameters.value(f"SERVO{number}_{end}", f"RC{number}_{end}") for end in ("MIN", "MAX"))
+    if function is None or int(function) not in SURFACES:
+        return None
     return (low, high) if low and high and high > low else None

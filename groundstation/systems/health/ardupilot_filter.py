@@ -242,12 +242,12 @@ def _biases(
 
 
 def _differences(flight: Flight, used: EstimatorInUse | None) -> Iterator[Evidence]:
-    """Yield what parts the second estimate (AHR2) from the attitude and position that flew."""
+    """Yield what parts AHR2, the estimator beside it, from the attitude and position that flew."""
     if "raw.AHR2" not in flight or "raw.ATT" not in flight:
         return
     second, first = flight["raw.AHR2"], flight["raw.ATT"]
     beside = " and ".join(used.others) if used is not None and used.others and used.name == "DCM" else ""
-    suffix, words = (UNUSED, f"{beside}, not in use") if beside else ("", "second estimate")
+    suffix, words = (UNUSED, f"{beside}, not in use") if beside else ("", "AHR2, the estimator beside it")
     other, names = _position(flight)
     if other is not None and is_number(second, "Lat", "Lng"):
         value = _distance_m(second, other, names)

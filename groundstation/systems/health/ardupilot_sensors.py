@@ -288,9 +288,9 @@ def timing(flight: Flight) -> Iterator[Evidence]:
 
 def supply(source: str, time_ns: Int64Array, volt: FloatArray) -> Iterator[Evidence]:
     """Yield the supply of the board, and how far it has swung so far."""
-    yield Evidence("battery", "supply_v", "board", source, "V", time_ns, volt)
+    yield Evidence("battery", "supply_v", "", source, "V", time_ns, volt)
     swing = np.fmax.accumulate(volt) - np.fmin.accumulate(volt)
-    yield Evidence("battery", "supply_swing_v", "board", source, "V", time_ns, swing)
+    yield Evidence("battery", "supply_swing_v", "", source, "V", time_ns, swing)
 
 
 def _of(

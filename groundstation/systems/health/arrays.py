@@ -6,8 +6,8 @@ from groundstation.results.arrays.typed import Arrays, Counts, Floats, Texts
 class HealthLanes(Arrays, figure="health_lanes", digits={"start_s": 2, "end_s": 2}):
     """Spans in which the worst quantity of a check is good, amber or red.
 
-    ``check`` is its title, ``grade`` one of ``good``, ``amber`` and ``red``. Events are drawn as short spans. Time
-    without a span is time in which nothing of the check is logged.
+    ``check`` is its title, ``grade`` one of ``good``, ``amber``, ``red`` and ``not logged`` (the log pauses). Events
+    are drawn as short spans. Other time without a span is time in which nothing of the check is logged.
     """
 
     check: Texts
@@ -23,5 +23,13 @@ class HealthSeries(Arrays, figure="health_series", digits={"time_s": 2, "value":
     """
 
     measure: Counts
+    time_s: Floats
+    value: Floats
+
+
+class HealthMotors(Arrays, figure="health_motors", digits={"time_s": 2, "value": 3}):
+    """Outputs to the motors around the loss of control of attitude."""
+
+    output: Counts
     time_s: Floats
     value: Floats

@@ -5,13 +5,14 @@ The flight in a sentence, a table of checks, lanes, panels, what was logged.
 
 from collections.abc import Mapping, Sequence
 
+from groundstation.base.words import tenths_text
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Cell, Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, Tone
 from groundstation.chapters.wording import ABSENT, clean, clock, number, percent, significant, typeset
 from groundstation.results.flight import FlightResults
 from groundstation.systems.health.answer import FIRST, HEADLINES, AutopilotHealth, Check, Happening, Measure, Verdict
 from groundstation.systems.health.plots import SIGNS, sign_of
-from groundstation.systems.health.sentence import gravity
+from groundstation.systems.health.sentence import gravity, span_words
 
 TITLE = "Autopilot health"
 LEAD = "Was GNSS good, was the filter healthy, and what went wrong when."
@@ -27,12 +28,13 @@ def health(results: FlightResults) -> Section | None:
     answer = results.answer(AutopilotHealth)
     if answer is None:
         return without_answer(results, "health", TITLE, LEAD)
-    told = [one for one in answer.checks if one.verdict != "not_logged"]
-    missing = [one.title for one in answer.checks if one.verdict == "not_logged"]
+    told = [one for one in answer.checks if one.is_told]
+    missing = [one.title for one in answer.checks if not one.is_told]
     shown = [one.key for one in told if one.is_bad or one.key in FIRST]
     parts: list[Part] = [
         _checks(told),
         *([Note(f"Not logged: {', '.join(missing)}.", "unknown")] if missing else []),
+        *([Figure("health.motors")] if answer.loss is not None and answer.loss.motors else []),
         Figure("health.lanes"),
         *(Figure("health.panels", key) for key in shown),
     ]
@@ -60,15 +62,16 @@ def _claim(answer: AutopilotHealth) -> Claim:
 def _checks(checks: Sequence[Check]) -> Grid:
     heads = (
         *(Head("Check"), Head("Verdict"), Head("What decided"), Head("Amber", True), Head("Red", True)),
-        *(Head("Worst span, or when"), Head("Limits"), Head("Source of the limits")),
+        *(Head("Longest span, or when"), Head("Limits"), Head("Source of the limits")),
     )
-    caption = "Amber and red: share of the time in the air in which the quantity is logged; amber includes red."
+    caption = "Amber and red: share of the time in the air in which the quantity is logged; amber includes red. "
+    caption += "The longest span need not hold the worst value: Every quantity has its time."
     return Grid("Checks", heads, [_check(one) for one in checks], caption, ("health_lanes",))
 
 
 def _check(check: Check) -> tuple[Cell, ...]:
     measure = check.decisive
-    mark = Mark(TONES[check.verdict], WORDS[check.verdict])
+    mark = Mark(TONES[check.verdict], "not judged" if check.verdict == "not_logged" else WORDS[check.verdict])
     what = with_signs(check.reason or ("" if measure is None else measure.told)) or ABSENT
     if measure is None:
         when = ABSENT if check.first_event_s is None else clock(check.first_event_s)
@@ -106,7 +109,7 @@ def _share(measure: Measure, share: float | None) -> str:
 
 def _when(check: Check, measure: Measure) -> str:
     if measure.span_start_s is not None and measure.span_end_s is not None:
-        return f"{clock(measure.span_start_s)} … {clock(measure.span_end_s)}"
+        return " … ".join(span_words(measure.span_start_s, measure.span_end_s))
     return ABSENT if check.first_event_s is None else clock(check.first_event_s)
 
 
@@ -181,9 +184,9 @@ def _measures(answer: AutopilotHealth) -> Grid:
     rows = [
         (
             one.name,
-            Mark(TONES[one.verdict], WORDS[one.verdict]),
+            Mark(TONES[one.verdict], "no limit" if one.is_unjudged else WORDS[one.verdict]),
             f"{significant(one.worst)} {sign_of(one.unit)}".strip(),
-            clock(one.worst_at_s),
+            tenths_text(one.worst_at_s),
             significant(one.median),
             f"{percent(one.amber_share, 1)} / {percent(one.amber_share_log, 1)}",
             f"{percent(one.red_share, 1)} / {percent(one.red_share_log, 1)}",

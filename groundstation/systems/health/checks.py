@@ -36,18 +36,20 @@ CHECKS: Mapping[str, str] = {  # in the order they are told
 ORDER: tuple[Verdict, ...] = ("not_logged", "pass", "warn", "fail")
 HOLD_STEPS, SHORTEST_HOLD_S, LONGEST_HOLD_S = 3.0, 2.0, 10.0  # how long a sample speaks
 EVENTS_TOLD = 3
+LEAST_PAUSE_S = 2.0  # of the log: without a sample of anything judged
 ONLY_FLOWN = ("tracking", "saturation")  # on the ground nothing follows its setpoints
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """Evidence with its grade over time: 0 fine, 1 amber, 2 red, -1 absent. Shapes (n,)."""
+    """Evidence with its grade over time: 0 fine, 1 amber, 2 red, -1 absent; whether in the air. Shapes (n,)."""
 
     evidence: Evidence
     measure: Measure
     time_s: FloatArray
     until_s: FloatArray
     grade: np.ndarray
+    in_air: np.ndarray
     is_drawn: bool = True
 
 
@@ -77,13 +79,14 @@ def judge(
     judged : tuple of Judged
         The evidence behind them.
     """
+    end_ns = flight.start_ns + round(flight.duration_s * NS_PER_S)
     clocks: dict[int, _Clock] = {}  # several quantities share the rows of a topic
     judged = []
     for each in evidence:
         if each.check in ONLY_FLOWN and not air.is_flown:
             continue
         if id(each.time_ns) not in clocks:
-            clocks[id(each.time_ns)] = _clock(each.time_ns, air)
+            clocks[id(each.time_ns)] = _clock(each.time_ns, air, end_ns)
         one = _judged(flight, each, air, limits[each.quantity], clocks[id(each.time_ns)])
         judged += [] if one is None else [one]
     order = {key: place for place, key in enumerate(CHECKS)}
@@ -119,12 +122,31 @@ class _Clock:
     in_air: np.ndarray
 
 
-def _clock(time_ns: Int64Array, air: Spans) -> _Clock:
-    steps = np.diff(time_ns)
-    step_ns = float(np.median(steps)) if len(steps) else 0.0
-    hold_ns = int(np.clip(HOLD_STEPS * step_ns, SHORTEST_HOLD_S * NS_PER_S, LONGEST_HOLD_S * NS_PER_S))
-    last_ns = time_ns[-1] + min(int(step_ns), hold_ns)
+def pauses(evidence: Iterable[Evidence]) -> tuple[Int64Array, Int64Array]:
+    """Return start and end of the pauses of a log.
+
+    In them nothing that is judged has a sample, for longer than a sample of the fastest of it speaks.
+    """
+    clocks = {id(one.time_ns): one.time_ns for one in evidence if one.check != "timing" and len(one.time_ns)}
+    if not clocks:
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    least_ns = max(round(LEAST_PAUSE_S * NS_PER_S), min(_hold_ns(one) for one in clocks.values()))
+    every = np.unique(np.concatenate(list(clocks.values())))
+    rows = np.flatnonzero(np.diff(every) > least_ns)
+    return every[rows], every[rows + 1]
+
+
+def _hold_ns(time_ns: Int64Array) -> int:
+    """Return how long a sample speaks at most."""
+    step_ns = float(np.median(np.diff(time_ns))) if len(time_ns) > 1 else 0.0
+    return int(np.clip(HOLD_STEPS * step_ns, SHORTEST_HOLD_S * NS_PER_S, LONGEST_HOLD_S * NS_PER_S))
+
+
+def _clock(time_ns: Int64Array, air: Spans, end_ns: int) -> _Clock:
+    hold_ns = _hold_ns(time_ns)
+    last_ns = time_ns[-1] + (min(int(np.median(np.diff(time_ns))), hold_ns) if len(time_ns) > 1 else 0)
     until_ns = np.minimum(np.append(time_ns[1:], last_ns), time_ns + hold_ns)
+    until_ns = np.minimum(until_ns, np.maximum(end_ns, time_ns))  # nothing speaks beyond the log
     seconds = air.until(until_ns) - air.until(time_ns)
     return _Clock(time_ns, until_ns, seconds, (until_ns - time_ns) / NS_PER_S, air.hold(time_ns))
 
@@ -139,7 +161,9 @@ def _judged(flight: Flight, evidence: Evidence, air: Spans, limit: Threshold, cl
     if limit.hold_s > 0.0:
         grade = _lasting(time_ns, until_ns, grade, round(limit.hold_s * NS_PER_S))
     measure = _measure(flight, evidence, limit, grade, clock, air)
-    return Judged(evidence, measure, flight.seconds(time_ns), flight.seconds(until_ns), grade, limit.is_drawn)
+    return Judged(
+        evidence, measure, flight.seconds(time_ns), flight.seconds(until_ns), grade, clock.in_air, limit.is_drawn
+    )
 
 
 def _grades(value: FloatArray, limit: Threshold) -> np.ndarray:
@@ -195,13 +219,14 @@ def _measure(
         )
     }
     mean = _mean(value, seconds, flown)
-    figure = _figure(value, seconds, flown, limit)
+    among = _lasting_rows(grade, flown if flown.any() else known, limit)
+    figure = _figure(value, seconds, flown, limit, among)
     verdict: Verdict = "not_logged"
-    if logged_s > 0.0 and figure is not None:
+    if logged_s > 0.0 and figure is not None and limit.is_judged:
         verdict = _verdict(figure, shares["amber_share"] or 0.0, shares["red_share"] or 0.0, limit)
         if verdict == "pass" and limit.amber_mean is not None and mean is not None and mean > limit.amber_mean:
             verdict = "warn"
-    worst_row = _worst_row(value, flown if flown.any() else known, limit)
+    worst_row = _worst_row(value, among, limit)
     start, end = _worst_span(time_ns, until_ns, grade, seconds)
     return Measure(
         check=evidence.check,
@@ -223,13 +248,25 @@ def _measure(
         span_end_s=None if end is None else float(flight.seconds(until_ns[end : end + 1])[0]),
         amber=limit.amber if limit.amber is not None else limit.amber_below,
         red=limit.red if limit.red is not None else limit.red_below,
-        is_below=limit.amber is None and limit.red is None,
+        is_below=limit.is_below,
         threshold_source=limit.source,
         is_flag=not limit.is_drawn and limit.rule == "share",
     )
 
 
-def _figure(value: FloatArray, seconds: FloatArray, flown: np.ndarray, limit: Threshold) -> float | None:
+def _lasting_rows(grade: np.ndarray, among: np.ndarray, limit: Threshold) -> np.ndarray:
+    """Return the rows whose worst value is told.
+
+    Where a limit counts only after some time, the rows that did count, if there are any: the worst value then lies in
+    a span that is told, and a shorter peak elsewhere does not stand beside a green lane.
+    """
+    worst = int(grade[among].max(initial=0))
+    return among & (grade == worst) if limit.hold_s > 0.0 and worst > 0 else among
+
+
+def _figure(
+    value: FloatArray, seconds: FloatArray, flown: np.ndarray, limit: Threshold, among: np.ndarray
+) -> float | None:
     """Return the number that the limits judge.
 
     Worst value, median, mean over time, or the rise of a counter.
@@ -242,7 +279,7 @@ def _figure(value: FloatArray, seconds: FloatArray, flown: np.ndarray, limit: Th
         return _mean(value, seconds, flown)
     if limit.rule == "rise":
         return rise(value, flown)
-    return float(value[_worst_row(value, flown, limit)])
+    return float(value[_worst_row(value, among, limit)])
 
 
 def _mean(value: FloatArray, seconds: FloatArray, flown: np.ndarray) -> float | None:
@@ -269,7 +306,7 @@ def rise(value: FloatArray, flown: np.ndarray) -> float:
 
 def _worst_row(value: FloatArray, among: np.ndarray, limit: Threshold) -> int:
     rows = np.flatnonzero(among & np.isfinite(value))
-    is_low = limit.amber is None and limit.red is None and limit.rule != "rise"
+    is_low = limit.is_below and limit.rule != "rise"
     return int(rows[np.argmin(value[rows]) if is_low else np.argmax(value[rows])])
 
 
@@ -353,6 +390,8 @@ def _check(
 
 def _reason(verdict: Verdict, decisive: Measure | None, texts: Sequence[str], measures: Sequence[Measure]) -> str:
     if verdict == "not_logged":
+        if any(one.is_unjudged for one in measures):
+            return "not judged: no limit in the log"
         return "logged, but not in the air" if measures else ""
     if texts:
         more = f" and {len(texts) - EVENTS_TOLD} more" if len(texts) > EVENTS_TOLD else ""

@@ -11,6 +11,7 @@ from groundstation.tables.table import Flight
 
 LAST_S = 1.0  # of the log: its median is the rate of descent at the end
 SINKS_MPS = 8.0  # ours: a multirotor lowers itself by 1 to 3 m/s, a plane on approach by 1 to 4
+FALL = "log ends in the air"
 DOWN = "velocity_down_mps"
 
 
@@ -30,6 +31,6 @@ def ends_in_the_air(flight: Flight, air: Spans) -> Iterator[Event]:
             continue
         is_open = end_ns - air.end_ns[-1] <= round(LAST_S * NS_PER_S)
         if is_open and np.median(down) > SINKS_MPS:
-            text = f"log ends in the air, sinking at {np.median(down):.0f} m/s"
+            text = f"{FALL}, sinking at {np.median(down):.0f} m/s"
             yield Event("faults", int(table.time_ns[rows][0]), "fail", text, f"{topic}.{DOWN}")
         return

@@ -5,26 +5,37 @@ from collections.abc import Sequence
 import numpy as np
 
 from groundstation.results.arrays.typed import joined
-from groundstation.systems.health.answer import Happening
-from groundstation.systems.health.arrays import HealthLanes, HealthSeries
+from groundstation.systems.health.answer import AttitudeLoss, Happening
+from groundstation.systems.health.arrays import HealthLanes, HealthMotors, HealthSeries
 from groundstation.systems.health.checks import CHECKS, Judged
 from groundstation.systems.health.evidence import FloatArray
+from groundstation.systems.health.motors import Motors
+from groundstation.tables.table import Flight
 
+BEFORE_S, AFTER_S = 3.0, 5.0  # of the outputs to the motors around a lost attitude
 MOST_POINTS = 600  # of a quantity
 GRADES = ("good", "amber", "red")
+NOT_LOGGED = "not logged"
 SHORTEST_SHARE = 1 / 2_000  # of the log: shorter breaks of a lane are not drawn
 EVENT_SHARE = 1 / 200  # of the log that an event is drawn as
 Spans = tuple[FloatArray, FloatArray]
 
 
-def lanes_figure(judged: Sequence[Judged], happenings: Sequence[Happening], duration_s: float) -> HealthLanes:
-    """Return the grade of each check over time: the worst of its quantities, and its events."""
+def lanes_figure(
+    judged: Sequence[Judged], happenings: Sequence[Happening], duration_s: float, pauses_s: Spans
+) -> HealthLanes:
+    """Return the grade of each check over time: the worst of its quantities, and its events.
+
+    A pause of the log is shown as not logged in the lane of each check that is.
+    """
     parts = []
     for key, title in CHECKS.items():
         own = [one for one in judged if one.measure.check == key]
         events = [one for one in happenings if one.check == key and one.grade != "info"]
         shown = _by_grade(own, events, duration_s)
-        for grade, (start, end) in zip(GRADES, shown, strict=True):
+        quiet = pauses_s if any(len(start) for start, _ in shown) else union(np.zeros(0), np.zeros(0))
+        logged = [without(one, pauses_s) for one in shown]
+        for grade, (start, end) in zip((*GRADES, NOT_LOGGED), (*logged, quiet), strict=True):
             count = len(start)
             parts.append(
                 HealthLanes(check=np.full(count, title), start_s=start, end_s=end, grade=np.full(count, grade))
@@ -97,6 +108,18 @@ def series_figure(judged: Sequence[Judged]) -> HealthSeries:
         time_s, value = _worst_of_each(one.time_s, one.evidence.value, is_below=one.measure.is_below)
         parts.append(HealthSeries(measure=np.full(len(time_s), number), time_s=time_s, value=value))
     return joined(parts)
+
+
+def motors_figure(flight: Flight, motors: Motors, loss: AttitudeLoss) -> HealthMotors:
+    """Return the outputs to the motors around the loss of control of attitude."""
+    time_s = flight.seconds(motors.time_ns)
+    rows = (time_s >= loss.start_s - BEFORE_S) & (time_s <= loss.start_s + AFTER_S)
+    count = int(np.count_nonzero(rows))
+    parts = [
+        HealthMotors(output=np.full(count, one.number), time_s=time_s[rows], value=one.value[rows])
+        for one in motors.each
+    ]
+    return joined([HealthMotors.empty(), *parts])
 
 
 def _worst_of_each(time_s: FloatArray, value: FloatArray, *, is_below: bool) -> tuple[FloatArray, FloatArray]:

@@ -36,6 +36,8 @@ class Threshold:
         Amber and red count where they last so long.
     warn_amber, fail_amber, warn_red, fail_red : float, optional
         Shares of time above which the check warns or fails; amber includes red. None: it never does.
+    worst : {'high', 'low'}
+        Which value is told of a quantity that has no limit.
     is_drawn : bool
         Whether it has a curve; a flag or counter shows in the lanes alone.
     source : str
@@ -56,6 +58,7 @@ class Threshold:
     fail_amber: float | None = number(None, 0.0, 1.0)
     warn_red: float | None = number(0.0, 0.0, 1.0)
     fail_red: float | None = number(0.05, 0.0, 1.0)
+    worst: Literal["high", "low"] = "high"
     is_drawn: bool = True
     source: str = ""
 
@@ -65,6 +68,17 @@ class Threshold:
             first, second = getattr(self, low), getattr(self, high)
             if first is not None and second is not None and first > second:
                 raise SettingsError(high, f"{second:g}", f"{first:g} or more, which is {low}")
+
+    @property
+    def is_judged(self) -> bool:
+        """Tell whether it has a limit at all."""
+        every = (self.amber, self.red, self.amber_below, self.red_below, self.amber_mean)
+        return any(one is not None for one in every)
+
+    @property
+    def is_below(self) -> bool:
+        """Tell whether its low values are the bad ones."""
+        return self.worst == "low" if not self.is_judged else self.amber is None and self.red is None
 
 
 @dataclass(frozen=True)

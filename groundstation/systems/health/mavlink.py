@@ -15,7 +15,7 @@ import numpy as np
 from groundstation.base.ardupilot_codes import MODES
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.health import ardupilot_sensors
-from groundstation.systems.health.ardupilot_control import STEPS_PER_DB, voltage
+from groundstation.systems.health.ardupilot_control import STEPS_PER_DB, used, voltage
 from groundstation.systems.health.evidence import Event, Evidence
 from groundstation.systems.health.logged import Series, bit, changes, is_number
 from groundstation.systems.health.messages import texts
@@ -202,6 +202,10 @@ def _battery(flight: Flight) -> Iterator[Evidence]:
         milli = table.values("voltage_battery")
         volt = np.where((milli > 0.0) & (milli != UNKNOWN_16), milli * 1e-3, np.nan)
         yield from voltage(f"{table.topic}.voltage_battery", table.time_ns, volt, 0, parameters_of(flight))
+        yield from used("battery_v", f"{table.topic}.voltage_battery", table.time_ns, volt, 0)
+    if table is not None and is_number(table, "current_battery"):
+        ampere = 0.01 * table.values("current_battery")
+        yield from used("battery_a", f"{table.topic}.current_battery", table.time_ns, ampere, 0)
     if table is not None and is_number(table, "battery_remaining"):
         left = table.values("battery_remaining")
         left = np.where(left >= 0.0, left / 100.0, np.nan)

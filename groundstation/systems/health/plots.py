@@ -7,16 +7,16 @@ import numpy as np
 from groundstation.chapters.plots.common import label, span
 from groundstation.chapters.wording import unit_sign
 from groundstation.plots.axes import time_axis
-from groundstation.plots.marks import AnyMark, Curve, Lanes, Limit, Role, series
+from groundstation.plots.marks import AnyMark, Curve, Lanes, Limit, Role, Spans, series
 from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row
 from groundstation.plots.ranges import broken_at_gaps
 from groundstation.results.flight import FlightResults
 from groundstation.systems.health.answer import AutopilotHealth, Check, Measure
-from groundstation.systems.health.arrays import HealthLanes, HealthSeries
+from groundstation.systems.health.arrays import HealthLanes, HealthMotors, HealthSeries
 
 LANE_MM, PANEL_MM = 5.2, 26.0
 MOST_CURVES = 7
-ROLES: Mapping[str, Role] = {"good": "good", "amber": "warn", "red": "bad"}
+ROLES: Mapping[str, Role] = {"good": "good", "amber": "warn", "red": "bad", "not logged": "unused"}
 SIGNS: Mapping[str, str] = {"m/s2": "m/s²", "rad2": "rad²"}
 
 
@@ -35,7 +35,8 @@ def lanes(results: FlightResults) -> Plot | None:
     return Plot(
         "health.lanes",
         "Checks over time",
-        "Green: within limits, orange: amber, red: beyond the red limit, or a message of that grade. White: none.",
+        "Green: within limits, orange: amber, red: beyond the red limit, or a message of that grade. "
+        "Grey: the log pauses. White: none.",
         "A lane for each check of the autopilot over flight time, coloured by grade.",
         (Row((panel,), LANE_MM * max(len(order), 1)),),
         ("health_lanes",),
@@ -72,6 +73,46 @@ def panels(results: FlightResults, key: str) -> Plot | None:
         f"{check.title} over flight time.",
         rows,
         ("health_series",),
+    )
+
+
+def motors(results: FlightResults) -> Plot | None:
+    """Return the outputs to the motors around the loss of control of attitude; None without one."""
+    answer, data = results.answer(AutopilotHealth), results.rows_of(HealthMotors)
+    if answer is None or answer.loss is None or data is None or not answer.loss.motors:
+        return None
+    loss = answer.loss
+    end_s = loss.start_s + loss.judged_s
+    marks: list[AnyMark] = [
+        Spans(
+            start=np.array([loss.start_s]),
+            end=np.array([end_s]),
+            kind=np.array(["judged"]),
+            role="unused",
+            name="judged after the loss",
+        )
+    ]
+    for place, number in enumerate(np.unique(data.output).tolist()):
+        own = data.where(data.output == number)
+        x, y = broken_at_gaps(own.time_s, own.value)
+        marks.append(Curve(x=x, y=y, role=series(place), name=f"output {number}"))
+    low, high = min(one.low for one in loss.motors), max(one.high for one in loss.motors)
+    marks += [
+        Limit(value=value, role="bad", label=name, emphasis="thin")
+        for value, name in ((low, "lowest"), (high, "highest"))
+    ]
+    room = 0.08 * (high - low)
+    known = data.value[np.isfinite(data.value)]
+    axis = Axis(
+        f"output, {loss.unit}" if loss.unit else "output", low=min(low, *known) - room, high=max(high, *known) + room
+    )
+    return Plot(
+        "health.motors",
+        "Motor outputs around the loss of attitude",
+        "What each motor was commanded; broken lines: lowest and highest output in flight.",
+        "Outputs to the motors over flight time around the loss of control of attitude.",
+        (Row((Panel(marks, time_axis(*span(data.time_s)), axis),), 2.0 * PANEL_MM),),
+        ("health_motors",),
     )
 
 
@@ -115,4 +156,4 @@ def _limits(measure: Measure, value: np.ndarray) -> Iterator[Limit]:
             yield Limit(value=level, role="warn" if role == "warn" else "bad", label=name, emphasis="thin")
 
 
-PLOTS: Mapping[str, Describe] = {"health.lanes": lanes, "health.panels": panels}
+PLOTS: Mapping[str, Describe] = {"health.lanes": lanes, "health.panels": panels, "health.motors": motors}

@@ -9,6 +9,7 @@ import numpy as np
 
 from groundstation.systems.health.evidence import Evidence, FloatArray
 from groundstation.systems.health.lean import between, down_of
+from groundstation.systems.health.motors import at_limit, motors_of
 from groundstation.systems.health.px4_topics import Topic, evidence_of, newest, topic, topics
 from groundstation.tables.table import Flight
 
@@ -70,6 +71,13 @@ def _battery(flight: Flight) -> Iterator[Evidence]:
         if bool((is_there & np.isfinite(warning)).any()):
             value = np.where(is_there & (warning != CHARGING), warning, np.nan)
             yield evidence_of("battery", "battery_warning", name, one, "warning", value)
+        for field, quantity, unit, least in (
+            ("voltage_v", "battery_v", "V", 0.0),
+            ("current_a", "battery_a", "A", -1.0),
+        ):
+            value = np.where(is_there & (one.values(field) > least), one.values(field), np.nan)
+            if bool((value > 0.0).any()):
+                yield evidence_of("battery", quantity, name, one, field, value, unit)
     power = topic(flight, "system_power")
     if power is None:
         return
@@ -172,6 +180,10 @@ def _saturation(flight: Flight) -> Iterator[Evidence]:
             if allocator.has(field):
                 missed = np.asarray(1.0 - allocator.values(field))
                 yield evidence_of("saturation", "saturation", sensor, allocator, field, missed)
+        return
+    motors = motors_of(flight)
+    if motors is not None:
+        yield Evidence("saturation", "output_full", "motors", motors.source, "", motors.time_ns, at_limit(motors))
         return
     for one in topics(flight, "actuator_outputs"):
         values = one.vector("output", 8)

@@ -1,17 +1,20 @@
 """The flight in one sentence, as a person would say it.
 
-GNSS good, filter healthy, vibration high 12:03-12:09.
+GNSS good, filter healthy, vibration high 12:03-12:39.
 """
 
 import re
 from collections.abc import Mapping, Sequence
 
-from groundstation.base.words import clock_text, listed
-from groundstation.systems.health.answer import FIRST, Check
+from groundstation.base.words import clock_text, listed, tenths_text
+from groundstation.systems.health.answer import FIRST, AttitudeLoss, Check
 
 MOST_BAD = 4
 LOST = "attitude_lost_deg"
 MORE = re.compile(r" and \d+ more$")
+IN_TENTHS_S = 10.0  # a shorter span is told in tenths of a second
+APART_S = 0.05  # failures that begin nearer have no order
+THROUGHOUT = " throughout"
 MOSTLY = 0.8  # of the time: a longer span is "throughout"
 QUOTED = ("faults", "battery", "gnss", "link")  # checks of which what was said is quoted
 LONGEST = 50  # characters of a message that the sentence quotes
@@ -73,15 +76,16 @@ FAIL: Mapping[str, str] = {
 }
 
 
-def told(checks: Sequence[Check]) -> str:
+def told(checks: Sequence[Check], loss: AttitudeLoss | None = None) -> str:
     """Return the sentence.
 
-    What warns or fails, the worst first, then what of GNSS, filter and vibration is good, then what is not logged.
+    What fails, in order of time where it has times, what warns, then what of GNSS, filter and vibration is good, then
+    what is not logged.
     """
     known = {one.key: one for one in checks}
     first = [known[key] for key in FIRST if key in known]
     bad = sorted((one for one in checks if one.is_bad), key=gravity)
-    parts = [_part(one) for one in bad[:MOST_BAD]]
+    parts = _by_time(bad[:MOST_BAD], loss)
     if len(bad) > MOST_BAD:
         parts.append(f"and {len(bad) - MOST_BAD} more")
     good = [_part(one) for one in first if one.verdict == "pass"]
@@ -89,6 +93,23 @@ def told(checks: Sequence[Check]) -> str:
     unknown = [f"{listed(absent)} not logged"] if absent else []
     shown = "; ".join(", ".join(filter(None, group)) for group in (parts, [*good, *unknown]) if any(group))
     return shown[:1].upper() + shown[1:]
+
+
+def _by_time(bad: Sequence[Check], loss: AttitudeLoss | None) -> list[str]:
+    """Return what is told of the bad checks.
+
+    The first of several failures is named as first, the others as later; those throughout the flight have no order.
+    """
+    failed = [one for one in bad if one.verdict == "fail" and when(one) not in ("", THROUGHOUT)]
+    failed.sort(key=lambda one: one.begins_s or 0.0)
+    begins = [one.begins_s or 0.0 for one in failed]
+    if len(failed) < 2 or begins[1] - begins[0] < APART_S:
+        return [_part(one, loss) for one in bad]
+    timed = [_part(one, loss, in_tenths=begins[-1] - begins[0] < IN_TENTHS_S) for one in failed]
+    others = [one for one in bad if one not in failed]
+    before = [_part(one) for one in others if one.verdict == "fail"]
+    after = [_part(one) for one in others if one.verdict != "fail"]
+    return [*before, f"first: {timed[0]}", f"then {timed[1]}", *timed[2:], *after]
 
 
 def gravity(check: Check) -> tuple[bool, bool, bool]:
@@ -100,7 +121,7 @@ def gravity(check: Check) -> tuple[bool, bool, bool]:
     return check.verdict != "fail", not is_lost, check.key not in FIRST
 
 
-def _part(check: Check) -> str:
+def _part(check: Check, loss: AttitudeLoss | None = None, *, in_tenths: bool = False) -> str:
     if check.verdict == "pass":
         return GOOD.get(check.key, "")
     if not check.is_bad:
@@ -108,7 +129,11 @@ def _part(check: Check) -> str:
     special = _special(check)
     if special.endswith("fix"):
         return special
-    return f"{special or (FAIL if check.verdict == 'fail' else WARN)[check.key]}{when(check)}"
+    words = f"{special or (FAIL if check.verdict == 'fail' else WARN)[check.key]}{when(check, in_tenths=in_tenths)}"
+    is_lost = check.decisive is not None and check.decisive.quantity == LOST
+    if is_lost and loss is not None and loss.suspect is not None:
+        return f"{words} (suspect motor, ESC or propeller of output {loss.suspect})"
+    return words
 
 
 def _special(check: Check) -> str:
@@ -130,15 +155,30 @@ def _special(check: Check) -> str:
     return ""
 
 
-def when(check: Check) -> str:
-    """Return the worst span or the first event of a check: `` 12:03-12:09``."""
+def when(check: Check, *, in_tenths: bool = False) -> str:
+    """Return the worst span or the first event of a check: `` 12:03-12:39``.
+
+    A span shorter than ten seconds is told in tenths.
+    """
     measure = check.decisive
     if check.first_event_s is not None:
-        return f" at {clock_text(check.first_event_s)}"
+        return f" at {(tenths_text if in_tenths else clock_text)(check.first_event_s)}"
     if measure is None or measure.span_start_s is None or measure.span_end_s is None:
         return ""
     share = measure.red_share if check.verdict == "fail" and measure.red_share else measure.amber_share
     if share is not None and share > MOSTLY:
-        return " throughout"
-    start, end = clock_text(measure.span_start_s), clock_text(measure.span_end_s)
+        return THROUGHOUT
+    start, end = span_words(measure.span_start_s, measure.span_end_s)
     return f" at {start}" if start == end else f" {start}-{end}"
+
+
+def span_words(start_s: float, end_s: float) -> tuple[str, str]:
+    """Return start and end of a span: in tenths of a second where it is shorter than ten.
+
+    Examples
+    --------
+    >>> span_words(77.61, 80.51), span_words(723.0, 759.0)
+    (('1:17.6', '1:20.5'), ('12:03', '12:39'))
+    """
+    told = tenths_text if end_s - start_s < IN_TENTHS_S else clock_text
+    return told(start_s), told(end_s)

@@ -7,7 +7,7 @@ from groundstation.systems.health.analysis import HEALTH
 from groundstation.systems.system import System, Tab
 
 if TYPE_CHECKING:
-    from groundstation.chapters.chapter import Chapter
+    from groundstation.chapters.chapter import Adviser, Chapter
     from groundstation.plots.plot import Describe
 
 
@@ -25,10 +25,17 @@ def _plots() -> "Mapping[str, Describe]":
     return health.PLOTS
 
 
+def _advice() -> "Adviser":
+    from groundstation.chapters.chapter import Adviser
+    from groundstation.systems.health import advice_chapter
+
+    return Adviser(advise=advice_chapter.advise, withheld=advice_chapter.withheld)
+
+
 def _tabs() -> tuple[Tab, ...]:
     from groundstation.systems.health.tab import health
 
     return (Tab(("health",), health),)
 
 
-SYSTEM = System(name="health", analyses=(HEALTH,), chapters=_chapters, plots=_plots, tabs=_tabs)
+SYSTEM = System(name="health", analyses=(HEALTH,), chapters=_chapters, plots=_plots, tabs=_tabs, advice=_advice)

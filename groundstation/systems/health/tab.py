@@ -17,7 +17,7 @@ from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.views import document, lanes
 
 ORDER: tuple[Verdict, ...] = ("fail", "warn", "pass", "not_logged")
-PALETTE = {"good": colours.GREEN, "amber": colours.ORANGE, "red": colours.VERMILION}
+PALETTE = {"good": colours.GREEN, "amber": colours.ORANGE, "red": colours.VERMILION, "not logged": colours.GREY}
 
 
 def health(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
@@ -30,7 +30,7 @@ def health(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     shown = _lanes(recorder, answer, results.rows_of(HealthLanes))
     if shown is not None:
         left.append(shown)
-    checks: list[rrb.View | rrb.Container] = []
+    checks: list[rrb.View | rrb.Container] = list(panels_of(recorder, plot_of(recorder, "health.motors", results)))
     for one in sorted(answer.checks, key=lambda check: ORDER.index(check.verdict)):
         told = plot_of(recorder, "health.panels", results, one.key)
         title = one.title[:1].upper() + one.title[1:]
@@ -61,7 +61,9 @@ def _lanes(recorder: Recorder, answer: AutopilotHealth, data: HealthLanes | None
         own = data.where(data.check == title)
         order = np.argsort(own.start_s, kind="stable")
         recorder.spans(path, own.start_s[order], own.end_s[order], own.grade[order], PALETTE)
-    return lanes("Checks: green within limits, orange amber, red beyond", paths) if paths else None
+    return (
+        lanes("Checks: green within limits, orange amber, red beyond, grey: pause of the log", paths) if paths else None
+    )
 
 
 def _messages(recorder: Recorder, answer: AutopilotHealth) -> bool:

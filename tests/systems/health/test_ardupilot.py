@@ -325,7 +325,7 @@ def test_an_attitude_that_is_lost_fails_and_comes_first() -> None:
         attitude = table("raw.ATT", TIME, DesRoll=0.0, Roll=roll, DesPitch=0.0, Pitch=0.0)
         made = flight(attitude, table("raw.MODE", [0.0], ModeNum=5.0))
         assert verdict(made, "tracking") == expected
-    assert answer(made).sentence.startswith("Control of attitude lost 0:50-0:53")
+    assert answer(made).sentence.startswith("Control of attitude lost 0:50.0-0:53.0")
 
 
 def test_a_log_that_ends_in_a_fall() -> None:

@@ -23,8 +23,8 @@ FIGURES: Mapping[str, tuple[str, str, Reduce, float]] = {  # quantity, sensor, r
     "offset_max_mgauss": ("compass_offset", "magnetometer 1", np.nanmax, 1.0),
     "accel_mismatch_max_mps2": ("accel_difference_mps2", "IMU 2 against IMU 1", np.nanmax, 1.0),
     "slow_loops_max": ("slow_loops", "main loop", np.nanmax, 1.0),
-    "supply_min_v": ("supply_v", "board", np.nanmin, 1.0),
-    "supply_max_v": ("supply_v", "board", np.nanmax, 1.0),
+    "supply_min_v": ("supply_v", "", np.nanmin, 1.0),
+    "supply_max_v": ("supply_v", "", np.nanmax, 1.0),
 }
 ROUNDING = 1e-6  # of single precision in the log
 

@@ -272,7 +272,7 @@ def test_a_failsafe_is_a_warning_and_an_error_a_failure() -> None:
     check = answer.check("faults")
     assert (check.verdict, check.reason, check.first_event_s) == ("fail", "Motor 2 failed", 45.0)
     assert (answer.check("battery").verdict, answer.check("battery").reason) == ("fail", "Low battery")
-    assert answer.sentence.startswith("“Motor 2 failed” at 0:45, “Low battery” at 0:50")
+    assert answer.sentence.startswith("First: “Motor 2 failed” at 0:45.0, then “Low battery” at 0:50.0")
     only = table("raw.ulog.text", [40.0], severity=["info"], text=["\x1b[33m[commander] Failsafe mode: RTL\x1b[0m"])
     check = answered(*new(), only).check("faults")
     assert (check.verdict, check.reason) == ("warn", "Failsafe mode: RTL")

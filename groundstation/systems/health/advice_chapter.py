@@ -1,0 +1,57 @@
+"""Advice after a lost attitude or a fall: what to inspect before the next flight."""
+
+from collections.abc import Iterator
+
+from groundstation.chapters.chapter import Advice
+from groundstation.results.flight import FlightResults
+from groundstation.systems.health.answer import AttitudeLoss, AutopilotHealth
+from groundstation.systems.health.ending import FALL
+
+LOSS, FELL = "lost attitude", "fall"
+SENSORS = {  # checks that, failed before the loss, are inspected too
+    "magnetometer": "the compass and its wiring",
+    "imu": "the IMU and its mount",
+    "vibration": "what shakes the IMU",
+    "clipping": "what shakes the IMU",
+    "gnss": "the GNSS antenna and receiver",
+    "battery": "the battery and its connector",
+    "link": "the remote control",
+}
+
+
+def advise(results: FlightResults) -> Iterator[Advice]:
+    """Yield what to inspect; nothing where control was kept to the end of the log."""
+    answer = results.answer(AutopilotHealth)
+    if answer is None:
+        return
+    loss = answer.loss
+    if loss is not None:
+        yield Advice("Check", _driving(loss, is_rotorcraft=answer.cannot_taxi), LOSS, is_pressing=True, is_danger=True)
+        for text in dict.fromkeys(_failed_before(answer, loss.start_s)):
+            yield Advice("Check", text, LOSS, is_pressing=True, is_danger=True)
+    elif any(one.grade == "fail" and one.text.startswith(FALL) for one in answer.happenings):
+        text = "the battery, the power supply, motors and propellers"
+        yield Advice("Check", text, FELL, is_pressing=True, is_danger=True)
+
+
+def _driving(loss: AttitudeLoss, *, is_rotorcraft: bool) -> str:
+    if loss.suspect is not None:
+        return f"motor, ESC, propeller and connector of output {loss.suspect}"
+    if loss.all_full:
+        return "the take-off mass, the battery, and the thrust of all motors"
+    if is_rotorcraft or loss.motors:
+        return "motors, ESCs, propellers and connectors of all outputs"
+    return "servos, linkages and control surfaces"
+
+
+def _failed_before(answer: AutopilotHealth, lost_s: float) -> Iterator[str]:
+    for one in answer.checks:
+        begins_s = one.begins_s
+        if one.verdict == "fail" and one.key in SENSORS and begins_s is not None and begins_s < lost_s:
+            yield SENSORS[one.key]
+
+
+def withheld(results: FlightResults) -> tuple[str, ...]:
+    """Return the words of advice that this aircraft cannot follow: a multirotor does not taxi."""
+    answer = results.answer(AutopilotHealth)
+    return ("taxi",) if answer is not None and answer.cannot_taxi else ()
