@@ -7,6 +7,7 @@ import pytest
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
+from groundstation.integrity.ledger import gaps_of
 from groundstation.systems.gnss.answer import VelocityAgainstPosition
 from groundstation.systems.gnss.examine import shortfalls_of
 from groundstation.systems.gnss.settings import GnssSettings
@@ -222,6 +223,15 @@ def test_hdop_of_sentences_is_that_of_the_receiver() -> None:
     other = replace(table(time_s, hdop=None), topic="gnss.2")
     two = replace(bare, topic="gnss.1")
     assert receiver(two, other, sentences(time_s, "raw.GNGGA", 0.62)).hdop is None, "of which receiver is not known"
+
+
+def test_subframes_that_satellites_send_irregularly_have_no_gaps() -> None:
+    """Steps of 0.25 and 0.75 s in turn, and 1 s now and then, are how they come."""
+    steps_s = np.tile([0.25, 0.75, 0.25, 0.25, 1.0, 0.25, 0.75, 0.25], 30)
+    time_ns = np.round(np.cumsum(steps_s) * 1e9).astype(np.int64)
+    assert len(gaps_of("raw.NAV-PVT", time_ns)), "of a topic with a rate they are lost"
+    for topic in ("raw.RXM-SFRBX", "raw.RXM-SFRBX.group", "raw.GNTXT", "raw.INF-NOTICE", "raw.MGA-10"):
+        assert not len(gaps_of(topic, time_ns)), topic
 
 
 def texts(topic: str, field: str, *said: str) -> Table:
