@@ -35,6 +35,8 @@ def gaps(results: FlightResults) -> Plot | None:
         marks.append(_gaps(holes, order, least))
     count = 0 if holes is None else len(holes)
     caption = f"Blue: data; red: gaps, n = {number(count, 0)}{', widened to be seen' if count else ''}."
+    uneven = int(np.count_nonzero(np.isnan(ledger.nominal_rate_hz[chosen]) & (ledger.gaps[chosen] == 0)))
+    caption += f" Sent irregularly, so that no gap can be told: {uneven} of these topics." if uneven else ""
     caption += f" {len(order)} of {len(topic)} topics." if len(order) < len(topic) else ""
     return Plot(
         "quality.gaps",

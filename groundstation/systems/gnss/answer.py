@@ -29,7 +29,7 @@ STATE_NAMES: Mapping[str, str] = MappingProxyType(
         "integrity_lost": "integrity lost",
         "none": "no fix",
         "no_record": "nothing recorded",
-        "log_silent": "log silent",
+        "log_silent": "log paused",  # of all sensors
     }
 )
 WITHOUT_RECORD = ("no_record", "log_silent")  # between rows: only the receiver is silent, or all of the log
@@ -39,13 +39,18 @@ COARSE = 2.0  # times the scatter: a coarser step of the logged places hides it
 
 @dataclass(frozen=True)
 class FixState:
-    """Time that a receiver spent in a state: seconds, share of its time, spells, the longest."""
+    """Time that a receiver spent in a state: seconds, share of its time, spells, the longest.
+
+    ``claimed_m`` is the median sigma of the horizontal position that it claims in this state; None where it is not
+    logged, or in fewer than ten rows.
+    """
 
     state: str
     seconds: float
     share: float
     spells: int
     longest_s: float
+    claimed_m: float | None = None
 
 
 @dataclass(frozen=True)
@@ -107,6 +112,8 @@ class StandstillScatter:
         Step in which positions are logged, 0 where none is seen.
     is_held : bool
         The receiver repeats one position: it holds it while it believes to stand.
+    phase_start_s, phase_end_s : float or None
+        Standstill of the overview that this lies in; None where the phases show none.
     """
 
     start_s: float
@@ -123,6 +130,8 @@ class StandstillScatter:
     claimed_mps: float | None
     resolution_m: float
     is_held: bool
+    phase_start_s: float | None = None
+    phase_end_s: float | None = None
 
     @property
     def is_coarse(self) -> bool:
@@ -154,7 +163,9 @@ class GnssReceiver(Brief):
 
     Medians and shares are of time with a fix; ``*_low`` and ``*_high`` leave one twentieth of the time beyond them.
     Values that are not logged are None. ``lost_s`` is time without a fix after the first one, ``silent_s`` time without
-    a row; ``placeless_rows`` claim a fix without a place or a velocity.
+    a row; ``placeless_rows`` claim a fix without a place or a velocity. ``standstill`` is the longest one,
+    ``standstills`` the longest of each kind of fix, the best kind first. ``hdop_of`` is the NMEA topic that HDOP comes
+    from, empty where it is a field of the receiver's rows.
     """
 
     topic: str
@@ -192,6 +203,20 @@ class GnssReceiver(Brief):
     jumps_found: int
     behind_ins_s: float | None
     behind_ins_sigma_s: float | None
+    standstills: tuple[StandstillScatter, ...] = ()
+    hdop_of: str = ""
+
+    @property
+    def fixes(self) -> tuple[FixState, ...]:
+        """States with a fix, the best first."""
+        return tuple(one for one in self.states if one.state not in (*WITHOUT_FIX, *WITHOUT_RECORD))
+
+    @property
+    def told_standstill(self) -> StandstillScatter | None:
+        """Standstill of which the sentence speaks: of the kind of fix held most, else the longest."""
+        most = max(self.fixes, key=lambda one: one.seconds, default=None)
+        mine = [one for one in self.standstills if most is not None and one.state == most.state]
+        return mine[0] if mine else self.standstill
 
     def share(self, *states: str) -> float:
         """Share of its time in some states."""
@@ -234,6 +259,16 @@ class ReceiverPair:
     lag_sigma_s: float | None
 
 
+@dataclass(frozen=True)
+class ReceiverTexts:
+    """Texts of the receiver in one topic (NMEA TXT, UBX INF): how many, how many differ, the first one."""
+
+    topic: str
+    count: int
+    different: int
+    first: str
+
+
 TELLING = frozenset(("rtk_fixed", "rtk_float", "ppp", "dgnss", "2d", "dead_reckoning"))
 LEAST_TOLD = 0.2  # share of a kind of fix that is worth a word
 
@@ -243,7 +278,7 @@ class GnssReception(Answer, WordsOfRecord):
     """Reception of all receivers of a flight.
 
     ``main`` is the topic of the one with the most time with a fix, of which ``sentence`` speaks; ``reasons`` say what
-    the grade rests on.
+    the grade rests on. ``has_heading_source`` is False where the log has one receiver alone.
     """
 
     analysis: ClassVar[str] = "gnss"
@@ -254,6 +289,8 @@ class GnssReception(Answer, WordsOfRecord):
     main: str
     receivers: tuple[GnssReceiver, ...]
     pairs: tuple[ReceiverPair, ...] = ()
+    texts: tuple[ReceiverTexts, ...] = ()
+    has_heading_source: bool = True
     settings: dict[str, Any] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
 

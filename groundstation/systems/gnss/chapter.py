@@ -16,8 +16,18 @@ from groundstation.systems.gnss.answer import (
     Grade,
     PositionJump,
     ReceiverPair,
+    StandstillScatter,
 )
-from groundstation.systems.gnss.wording_answer import length_text, memory_of, name_of, seconds_text, share_text
+from groundstation.systems.gnss.wording_answer import (
+    length_text,
+    meaning_of,
+    memory_of,
+    name_of,
+    same_claims,
+    seconds_text,
+    share_text,
+    texts_text,
+)
 
 TITLE = "GNSS reception"
 LEAD = "What the receiver had over time, how good it was, and where it was lost."
@@ -27,8 +37,10 @@ MARKS: dict[Grade, Mark] = {
     "bad": Mark("bad", "Bad"),
     "unknown": Mark("unknown", "Not judged"),
 }
+ABSENT = "—"
 NOT_LOGGED = "not logged"
 MOST_ROWS = 20
+NO_HEADING = "No heading source in the log: track only."
 NOT_JUDGED = (
     "The log has neither the kind of fix nor satellites, dilution or claimed accuracy: only losses and jumps show."
 )
@@ -43,10 +55,17 @@ def gnss(results: FlightResults) -> Section | None:
     notes = [Note(with_full_stop(typeset(reason)), tone) for reason in answer.reasons]
     if answer.grade == "unknown":
         notes.append(Note(NOT_JUDGED, "unknown"))
+    if not answer.has_heading_source:
+        notes.append(Note(NO_HEADING))
+    notes += [Note(with_full_stop(typeset(same))) for same in _same_claims(answer)]
     parts: list[Part | None] = [*notes, Figure("gnss.states"), _states(answer), _quality(answer)]
     for one in answer.receivers:
         parts += [Figure("gnss.quality", of=one.topic), *_standstill(one, answer), *_motion(one, answer)]
-    parts += [_losses(answer), _jumps(answer)]
+    parts += [
+        _losses(answer),
+        _jumps(answer),
+        *(Note(with_full_stop(typeset(texts_text(one)))) for one in answer.texts),
+    ]
     for pair in answer.pairs:
         parts += [_pair(pair), Figure("gnss.pair", of=f"{pair.second} from {pair.first}")]
     return Section("gnss", TITLE, LEAD, kept(parts), typeset(answer.sentence), claim=_claim(answer))
@@ -63,14 +82,24 @@ def _claim(answer: GnssReception) -> Claim:
         ("HDOP", number(main.hdop, 1), "median"),
         ("C/N0", number(main.cn0_dbhz, 0, "dB-Hz"), "median"),
     ]
-    stood = main.standstill
+    stood = main.told_standstill
     if stood is not None and not stood.is_held and not stood.is_coarse:
+        kind = name_of(stood.state) if len(main.fixes) > 1 else ""
         claimed = "" if stood.claimed_m is None else f"{length_text(stood.claimed_m)} claimed"
-        told.append(("Scatter", length_text(stood.scatter_m), claimed))
+        told.append(("Scatter", length_text(stood.scatter_m), ", ".join(filter(None, (kind, claimed)))))
     figures = tuple(one for one in told if one[1] != "—")
     above = answer.against
-    sentences = tuple(with_full_stop(typeset(reason)) for reason in answer.reasons if reason != above)
-    return Claim(Rank.GNSS, MARKS[answer.grade], _headline(answer), value, remark, sentences, figures)
+    reasons = [reason for reason in answer.reasons if reason != above]
+    sentences = [with_full_stop(typeset(reason)) for reason in (*reasons, *_same_claims(answer))]
+    if not answer.has_heading_source:
+        sentences.append(NO_HEADING)
+    return Claim(Rank.GNSS, MARKS[answer.grade], _headline(answer), value, remark, tuple(sentences), figures)
+
+
+def _same_claims(answer: GnssReception) -> list[str]:
+    """Return that a worse kind of fix claims as much as a better one, of each receiver that does."""
+    told = [(one, same_claims(one)) for one in answer.receivers]
+    return [f"{one.topic}: {same}" if len(answer.receivers) > 1 else same for one, same in told if same]
 
 
 def _headline(answer: GnssReception) -> str:
@@ -114,6 +143,9 @@ def _with_tail(name: str, tail: str, places: int, unit: str = "") -> Callable[[G
     return told
 
 
+_hdop = _with_tail("hdop", "hdop_high", 2)
+
+
 def _length(value: float | None) -> str:
     return NOT_LOGGED if value is None else length_text(value)
 
@@ -139,7 +171,7 @@ QUALITY: tuple[tuple[str, Callable[[GnssReceiver], str]], ...] = (
     ("Satellites used", _with_tail("satellites_used", "satellites_used_low", 0)),
     ("Satellites tracked", _with_tail("satellites_tracked", "satellites_tracked", 0)),
     ("C/N0", _with_tail("cn0_dbhz", "cn0_low_dbhz", 1, "dB-Hz")),
-    ("HDOP", _with_tail("hdop", "hdop_high", 2)),
+    ("HDOP", lambda one: _hdop(one) + (f", from {one.hdop_of.removeprefix('raw.')}" if one.hdop_of else "")),
     ("PDOP", _with_tail("pdop", "pdop_high", 2)),
     ("Claimed horizontal σ", lambda one: _length(one.horizontal_sigma_m)),
     ("Claimed vertical σ", lambda one: _length(one.vertical_sigma_m)),
@@ -157,26 +189,65 @@ def _of(one: GnssReceiver, answer: GnssReception) -> str:
 
 
 def _standstill(one: GnssReceiver, answer: GnssReception) -> list[Part | None]:
-    stood = one.standstill
-    if stood is None:
+    """Return scatter beside the claim, a row for each kind of fix, and the figure of the kind held most."""
+    every = one.standstills or ((one.standstill,) if one.standstill is not None else ())
+    if not every:
         return []
-    pairs: list[tuple[str, str, str]] = [
-        ("Stood", f"{clock(stood.start_s)} to {clock(stood.end_s)}", f"{stood.samples} rows, {name_of(stood.state)}")
+    heads = (
+        *(Head("Kind of fix"), Head("Judged"), Head("Rows", True), Head("Span", True)),
+        *(Head("Horizontal scatter (σ claimed)", True), Head("Vertical scatter (σ claimed)", True)),
+        Head("Speed shown, RMS (σ claimed)", True),
+    )
+    rows = [
+        (
+            *(name_of(stood.state), f"{clock(stood.start_s)} to {clock(stood.end_s)}", number(stood.samples, 0)),
+            seconds_text(stood.end_s - stood.start_s),
+            _beside(_horizontal(stood), None if stood.claimed_m is None else length_text(stood.claimed_m)),
+            _beside(
+                ABSENT if stood.is_held or stood.up_scatter_m is None else length_text(stood.up_scatter_m),
+                None if stood.up_claimed_m is None else length_text(stood.up_claimed_m),
+            ),
+            _beside(
+                number(stood.speed_rms_mps, 3, "m/s"),
+                None if stood.claimed_mps is None else number(stood.claimed_mps, 3, "m/s"),
+            ),
+        )
+        for stood in every
     ]
-    if not stood.is_held:
-        seen = f"below {length_text(stood.resolution_m)}" if stood.is_coarse else length_text(stood.scatter_m)
-        pairs.append(("Horizontal scatter", seen, f"claimed: {_length(stood.claimed_m)}"))
-        if stood.up_scatter_m is not None:
-            pairs.append(
-                ("Vertical scatter", length_text(stood.up_scatter_m), f"claimed: {_length(stood.up_claimed_m)}")
-            )
-    if stood.speed_rms_mps is not None:
-        claimed = NOT_LOGGED if stood.claimed_mps is None else number(stood.claimed_mps, 3, "m/s")
-        pairs.append(("Speed shown, RMS", number(stood.speed_rms_mps, 3, "m/s"), f"claimed: {claimed}"))
+    told = [f"{name_of(stood.state)}: {memory_of(stood)}" if len(every) > 1 else memory_of(stood) for stood in every]
+    caption = " ".join(with_full_stop(f"{text[:1].upper()}{text[1:]}") for text in (*told, *_edges(one, every, answer)))
     return [
-        Facts(f"At standstill{_of(one, answer)}", pairs, with_full_stop(memory_of(stood))),
+        Grid(f"Scatter at standstill by kind of fix{_of(one, answer)}", heads, rows, caption, ("gnss_standstill",)),
         Figure("gnss.standstill", of=one.topic),
     ]
+
+
+def _horizontal(stood: StandstillScatter) -> str:
+    if stood.is_held:
+        return ABSENT
+    return f"below {length_text(stood.resolution_m)}" if stood.is_coarse else length_text(stood.scatter_m)
+
+
+def _beside(value: str, claimed: str | None) -> str:
+    return f"{value} ({NOT_LOGGED if claimed is None else claimed})" if value != ABSENT else value
+
+
+def _edges(one: GnssReceiver, every: tuple[StandstillScatter, ...], answer: GnssReception) -> list[str]:
+    """Return why a standstill is shorter here than in the overview, and which kinds of fix had none."""
+    told = []
+    spans = [(stood.phase_start_s, stood.phase_end_s) for stood in every]
+    shown = dict.fromkeys(f"{clock(start)} to {clock(end)}" for start, end in spans if start is not None)
+    if shown:
+        window_s, guard_s = (float(answer.settings.get(name, 0.0)) for name in ("still_window_s", "standstill_guard_s"))
+        told.append(
+            f"the overview shows standstill from {', '.join(shown)}; left out here: where the mean velocity over "
+            f"{window_s:g} s still shows motion, {guard_s:g} s at either end, and another kind of fix"
+        )
+    without = [name_of(state.state) for state in one.fixes if state.state not in {stood.state for stood in every}]
+    if without:
+        least_s = float(answer.settings.get("standstill_min_s", 0.0))
+        told.append(f"{', '.join(without)}: no standstill of {least_s:g} s, so no scatter")
+    return told
 
 
 def _motion(one: GnssReceiver, answer: GnssReception) -> list[Part | None]:
@@ -199,7 +270,10 @@ def _motion(one: GnssReceiver, answer: GnssReception) -> list[Part | None]:
         pairs.append(
             ("As means over 10 s, RMS", number(motion.lasting_rms_mps, 3, "m/s"), "without noise of the fixes")
         )
-    return [Facts(f"Velocity against position{_of(one, answer)}", pairs), Figure("gnss.steps", of=one.topic)]
+    too_sure = float(answer.settings.get("too_sure", 2.0))
+    meaning = meaning_of(motion, too_sure)
+    text = with_full_stop(f"{meaning[:1].upper()}{meaning[1:]}")
+    return [Facts(f"Velocity against position{_of(one, answer)}", pairs, text), Figure("gnss.steps", of=one.topic)]
 
 
 def _losses(answer: GnssReception) -> Part | None:

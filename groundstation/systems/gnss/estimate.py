@@ -20,7 +20,8 @@ from groundstation.systems.gnss.pairs import ComparedReceivers, compare
 from groundstation.systems.gnss.series import ReceiverRows, series_of
 from groundstation.systems.gnss.settings import GnssSettings
 from groundstation.systems.gnss.spells import Spells, losses_of, seconds_after_first_fix, spells_of, states_of
-from groundstation.systems.gnss.standstill import Stood, standstill_of
+from groundstation.systems.gnss.standstill import Stood, longest_of, standstills_of
+from groundstation.systems.gnss.texts import finding_of, has_heading_source, texts_of
 from groundstation.systems.gnss.wording_answer import never_had, sentence_of
 from groundstation.tables.phases import Phases
 from groundstation.tables.sources import sources_of_kind
@@ -86,6 +87,7 @@ def reception_of(
         for reason in judge(one.answer, one.rows, settings, one is main or main.answer.first_fix_s is None)
     ]
     judged += [reason for pair in pairs for reason in judge_pair(pair.answer)]
+    texts = texts_of(flight)
     answer = GnssReception(
         grade=worst_of(judged, main.answer),
         sentence=_sentence([one.answer for one in found], main.answer),
@@ -93,10 +95,12 @@ def reception_of(
         main=main.rows.topic,
         receivers=tuple(one.answer for one in found),
         pairs=tuple(pair.answer for pair in pairs),
+        texts=texts,
+        has_heading_source=has_heading_source(flight),
         settings=asdict(settings),
         figures=_figures(found, pairs),
     )
-    return Reception(answer, tuple(reason.finding for reason in judged))
+    return Reception(answer, (*(reason.finding for reason in judged), *(finding_of(one) for one in texts)))
 
 
 def _named(reason: Judged, receivers: int) -> str:
@@ -128,8 +132,9 @@ def _one(
 ) -> One:
     rows = series_of(flight, topic, settings)
     spells = spells_of(rows, others_s)
-    states = states_of(spells)
-    stood = standstill_of(rows, phases, settings)
+    states = states_of(rows, spells)
+    each = standstills_of(rows, phases, settings)
+    stood = longest_of(each)
     steps = steps_of(rows, settings)
     with_fix = np.flatnonzero(rows.has_fix)
     used, tracked = _values(rows, "satellites_used"), _values(rows, "satellites_tracked")
@@ -172,8 +177,11 @@ def _one(
         jumps_found=steps.jumps_found,
         behind_ins_s=None if delay is None else delay.latency_s,
         behind_ins_sigma_s=None if delay is None else delay.sigma_s,
+        standstills=tuple(one.answer for one in each),
+        hdop_of=rows.hdop_of,
     )
-    return One(rows, spells, stood, steps, answer)
+    shown = next((one for one in each if one.answer is answer.told_standstill), None)
+    return One(rows, spells, shown, steps, answer)
 
 
 def _share_with_fix(rows: ReceiverRows, spells: Spells) -> float:

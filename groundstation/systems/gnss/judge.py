@@ -5,21 +5,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.findings import Finding, Severity
-from groundstation.systems.gnss.answer import WITHOUT_FIX, FixLoss, GnssReceiver, Grade, ReceiverPair
+from groundstation.systems.gnss.answer import WITHOUT_FIX, FixLoss, GnssReceiver, Grade, ReceiverPair, StandstillScatter
 from groundstation.systems.gnss.series import ReceiverRows
 from groundstation.systems.gnss.settings import GnssSettings
 from groundstation.systems.gnss.wording_answer import (
+    LATE_S,
     length_text,
     memory_of,
     name_of,
     never_had,
+    same_claims,
     seconds_text,
     share_text,
 )
 
 GRADES: tuple[Grade, ...] = ("unknown", "good", "warn", "bad")
 APART_SIGMAS = 3.0  # times the claimed sigma that the distance of two antennas may scatter
-LATE_S = 0.1  # a delay between position and velocity that is worth a line
 
 
 @dataclass(frozen=True)
@@ -156,12 +157,18 @@ def _limits(settings: GnssSettings, warn: float, bad: float) -> tuple[tuple[Grad
 
 
 def _claims(one: GnssReceiver, settings: GnssSettings) -> list[Judged]:
-    stood = one.standstill
-    if stood is None:
-        return []
+    found = []
+    for stood in one.standstills:
+        kind = f"while {name_of(stood.state)}, " if len(one.standstills) > 1 else ""
+        found += [replace(judged, text=kind + judged.text) for judged in _claims_at(stood, one.topic, settings)]
+    same = same_claims(one)
+    return [*found, *([Judged("good", same, "same_claim", one.topic)] if same else [])]
+
+
+def _claims_at(stood: StandstillScatter, topic: str, settings: GnssSettings) -> list[Judged]:
     place = f"at {stood.start_s:.1f} s"
     if stood.is_held or stood.is_coarse:
-        return [Judged("good", memory_of(stood), "held", one.topic, place)]
+        return [Judged("good", memory_of(stood), "held", topic, place)]
     found = []
     for scatter, claimed, what in (
         (stood.scatter_m, stood.claimed_m, "position"),
@@ -169,11 +176,11 @@ def _claims(one: GnssReceiver, settings: GnssSettings) -> list[Judged]:
     ):
         if scatter is not None and claimed is not None and claimed > 0.0 and scatter > settings.too_sure * claimed:
             text = f"{what} scatters by {length_text(scatter)} at standstill where {length_text(claimed)} is claimed"
-            found.append(Judged("warn", text, "too_sure", one.topic, place))
+            found.append(Judged("warn", text, "too_sure", topic, place))
     speed, claimed = stood.speed_rms_mps, stood.claimed_mps
     if speed is not None and claimed is not None and claimed > 0.0 and speed > settings.too_sure * claimed:
         text = f"shows {speed:.2f} m/s RMS at standstill where {claimed:.2f} m/s is claimed"
-        found.append(Judged("warn", text, "too_sure", one.topic, place))
+        found.append(Judged("warn", text, "too_sure", topic, place))
     return found
 
 

@@ -142,9 +142,11 @@ def standstill(results: FlightResults, topic: str) -> Plot | None:
     if data is None or answer is None:
         return None
     mine = data.where(data.topic == topic)
-    stood = next((one.standstill for one in answer.receivers if one.topic == topic), None)
-    if not len(mine) or stood is None or stood.is_held:
+    one = next((one for one in answer.receivers if one.topic == topic), None)
+    stood = None if one is None else one.told_standstill
+    if not len(mine) or one is None or stood is None or stood.is_held:
         return None
+    kind = f" while {STATE_NAMES.get(stood.state, stood.state)}" if len(one.fixes) > 1 else ""
     scale, unit = (1.0 / M_PER_CM, "cm") if stood.scatter_m < 0.5 else (1.0, "m")
     reach = symmetric(scale * finite(mine.north_m, mine.east_m), 0.1)
     plane: list[AnyMark] = [Dots(x=scale * mine.east_m, y=scale * mine.north_m, role="gnss", name="positions")]
@@ -167,7 +169,7 @@ def standstill(results: FlightResults, topic: str) -> Plot | None:
         panels.append(_averaging(means.where(means.topic == topic), stood.claimed_m, scale, unit))
     return Plot(
         f"gnss.standstill.{topic}",
-        f"Scatter at standstill{_of(results, topic)}",
+        f"Scatter at standstill{kind}{_of(results, topic)}",
         "Left: positions about their mean, and the σ claimed along each axis. Right: scatter of means over a time. "
         "Errors without memory fall along the grey line; where the dots stay above it, errors last, and the scatter "
         "of a short standstill understates them.",

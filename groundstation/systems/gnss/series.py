@@ -1,13 +1,15 @@
 """Rows of one receiver as arrays: places, velocities, states, time each row stands for."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.base.geodesy import SEMI_MAJOR_M, curvature_radii_m, on_earth
-from groundstation.base.records import BoolArray
+from groundstation.base.records import BoolArray, Column
+from groundstation.base.signals import topics_of_kind
 from groundstation.systems.gnss.answer import WITHOUT_FIX
 from groundstation.systems.gnss.settings import GnssSettings
 from groundstation.tables.gaps import largest_step_s
@@ -42,6 +44,8 @@ class ReceiverRows:
         Usual step, and the longest that is no gap; NaN and infinity of a single row.
     held_s : ndarray, shape (n,)
         Seconds that each row stands for.
+    hdop_of : str
+        NMEA topic that the HDOP of the table comes from; empty where it is a field of its rows.
     """
 
     topic: str
@@ -57,6 +61,7 @@ class ReceiverRows:
     step_s: float
     gap_s: float
     held_s: FloatArray
+    hdop_of: str = ""
 
     @property
     def placeless(self) -> int:
@@ -109,7 +114,7 @@ def series_of(flight: Flight, topic: str, settings: GnssSettings) -> ReceiverRow
 
     Repeated times are one row, with the first value of each field.
     """
-    table = flight[topic].unique_times()
+    table, hdop_of = _with_hdop(flight, flight[topic].unique_times())
     time_s = flight.seconds(table.time_ns)
     steps = np.diff(time_s)
     step_s = float(np.median(steps)) if len(steps) else np.nan
@@ -138,7 +143,34 @@ def series_of(flight: Flight, topic: str, settings: GnssSettings) -> ReceiverRow
         step_s,
         gap_s,
         held_s,
+        hdop_of,
     )
+
+
+def _with_hdop(flight: Flight, table: Table) -> tuple[Table, str]:
+    """Return rows with the HDOP of NMEA sentences of the same epochs where they have none, and its topic.
+
+    Of a log with several receivers nothing says whose sentences they are.
+    """
+    if len(topics_of_kind("gnss", flight.topics())) > 1 or np.isfinite(table.values("hdop")).any() or len(table) < 2:
+        return table, ""
+    for topic in sorted(flight.topics(), key=lambda name: (not name.endswith("GGA"), name)):
+        if not fnmatchcase(topic, "raw.[GB]?GGA") and not fnmatchcase(topic, "raw.[GB]?GSA"):
+            continue
+        values = flight[topic].values("HDOP")
+        known = np.flatnonzero(np.isfinite(values) & (values > 0.0))
+        if not known.size:
+            continue
+        time_ns = flight[topic].time_ns[known]
+        place = np.searchsorted(time_ns, table.time_ns)
+        before, behind = np.maximum(place - 1, 0), np.minimum(place, len(time_ns) - 1)
+        is_before = np.abs(table.time_ns - time_ns[before]) <= np.abs(time_ns[behind] - table.time_ns)
+        nearest = np.where(is_before, before, behind)
+        near = np.abs(time_ns[nearest] - table.time_ns) <= 0.5 * np.median(np.diff(table.time_ns))
+        if near.any():
+            hdop = np.where(near, values[known][nearest], np.nan)
+            return replace(table, columns={**table.columns, "hdop": Column(hdop, near)}), topic
+    return table, ""
 
 
 def _states(table: Table, has_any: BoolArray) -> NDArray[np.str_]:

@@ -10,6 +10,7 @@ from groundstation.systems.gnss.answer import STATE_NAMES, WITHOUT_FIX, WITHOUT_
 from groundstation.systems.gnss.series import ReceiverRows
 from groundstation.systems.gnss.settings import GnssSettings
 
+LEAST_CLAIMS = 10  # rows with a claimed sigma that make its median
 NO_RECORD, LOG_SILENT = "no_record", "log_silent"
 
 
@@ -47,8 +48,9 @@ def spells_of(one: ReceiverRows, others_s: FloatArray | None) -> Spells:
     return Spells(start[first], end, state[first])
 
 
-def states_of(spells: Spells) -> tuple[FixState, ...]:
-    """Return the time in each state, the best state first."""
+def states_of(one: ReceiverRows, spells: Spells) -> tuple[FixState, ...]:
+    """Return the time in each state and the sigma claimed in it, the best state first."""
+    claimed_m = one.values("horizontal_sigma_m")
     whole_s = float(spells.seconds.sum())
     found = []
     for name in (*STATE_NAMES, *sorted(set(spells.state.tolist()) - STATE_NAMES.keys())):
@@ -56,7 +58,9 @@ def states_of(spells: Spells) -> tuple[FixState, ...]:
         if mine.size:
             seconds = float(mine.sum())
             share = seconds / whole_s if whole_s > 0.0 else float(np.mean(spells.state == name))
-            found.append(FixState(name, seconds, share, int(mine.size), float(mine.max())))
+            sigmas = claimed_m[np.isfinite(claimed_m) & (one.state == name)]
+            sigma_m = float(np.median(sigmas)) if len(sigmas) >= LEAST_CLAIMS else None
+            found.append(FixState(name, seconds, share, int(mine.size), float(mine.max()), sigma_m))
     return tuple(found)
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray
-from groundstation.systems.gnss.answer import COARSE, StandstillScatter
+from groundstation.systems.gnss.answer import COARSE, STATE_NAMES, StandstillScatter
 from groundstation.systems.gnss.series import ReceiverRows
 from groundstation.systems.gnss.settings import GnssSettings
 from groundstation.systems.gnss.spells import known
@@ -33,14 +33,14 @@ class Stood(NamedTuple):
     scatter_m: FloatArray
 
 
-def standstill_of(one: ReceiverRows, phases: Phases, settings: GnssSettings) -> Stood | None:
-    """Return the longest standstill with one kind of fix; None without one long enough."""
+def standstills_of(one: ReceiverRows, phases: Phases, settings: GnssSettings) -> tuple[Stood, ...]:
+    """Return the longest standstill of each kind of fix, the best kind first; empty without one long enough."""
     if len(one.time_s) < settings.standstill_samples_min:
-        return None
+        return ()
     still = _is_still(one, settings) & ~np.isin(phases.at(one.time_s), IN_MOTION)
     still &= np.isfinite(one.latitude_deg) & np.isfinite(one.longitude_deg) & one.has_fix
     breaks = np.append(False, one.is_gap | (one.state[1:] != one.state[:-1]))
-    best: tuple[float, NDArray[np.intp]] | None = None
+    best: dict[str, tuple[float, NDArray[np.intp]]] = {}
     for first, behind in runs(still):
         cuts = first + 1 + np.flatnonzero(breaks[first + 1 : behind])
         for start, end in zip([first, *cuts], [*cuts, behind], strict=True):
@@ -53,10 +53,25 @@ def standstill_of(one: ReceiverRows, phases: Phases, settings: GnssSettings) -> 
             if len(rows) < settings.standstill_samples_min:
                 continue
             length_s = float(one.time_s[rows[-1]] - one.time_s[rows[0]])
-            is_longest = length_s >= settings.standstill_min_s and (best is None or length_s > best[0])
+            state = str(one.state[rows[0]])
+            is_longest = length_s >= settings.standstill_min_s and (state not in best or length_s > best[state][0])
             if is_longest and not _creeps(one, rows, settings):
-                best = length_s, rows
-    return None if best is None else _judged(one, best[1])
+                best[state] = length_s, rows
+    order = (*(name for name in STATE_NAMES if name in best), *sorted(best.keys() - STATE_NAMES.keys()))
+    return tuple(_judged(one, best[name][1], phases) for name in order)
+
+
+def longest_of(stood: tuple[Stood, ...]) -> Stood | None:
+    """Return the longest standstill, of the better kind of fix where two are as long; None without any."""
+    return max(stood, key=lambda one: one.answer.end_s - one.answer.start_s, default=None)
+
+
+def _phase_of(phases: Phases, start_s: float, end_s: float) -> tuple[float | None, float | None]:
+    """Return the standstill of the overview that holds the middle of a stretch."""
+    middle_s = 0.5 * (start_s + end_s)
+    shown = phases.likely or phases.intervals
+    found = [one for one in shown if one.phase == "standstill" and one.start_s <= middle_s <= one.end_s]
+    return (found[0].start_s, found[0].end_s) if found else (None, None)
 
 
 def _is_still(one: ReceiverRows, settings: GnssSettings) -> BoolArray:
@@ -107,7 +122,7 @@ def _creeps(one: ReceiverRows, rows: NDArray[np.intp], settings: GnssSettings) -
     return bool(len(velocity)) and float(np.hypot(*velocity.mean(axis=0))) > CREEP * settings.still_mps
 
 
-def _judged(one: ReceiverRows, rows: NDArray[np.intp]) -> Stood:
+def _judged(one: ReceiverRows, rows: NDArray[np.intp], phases: Phases) -> Stood:
     middle = np.mean(one.latitude_deg[rows]), np.mean(one.longitude_deg[rows])
     plan = one.plan_m(rows, np.full(len(rows), middle[0]), np.full(len(rows), middle[1]))
     up = one.up_m[rows] - np.nanmean(one.up_m[rows]) if np.isfinite(one.up_m[rows]).any() else one.up_m[rows]
@@ -124,6 +139,7 @@ def _judged(one: ReceiverRows, rows: NDArray[np.intp]) -> Stood:
         independent = max(min(length_s / max(2.0 * correlation_s, step_s), float(len(rows))), 1.0)
     averaged_s, scatter = scatter_of_means(offset[:, :2], step_s)
     speed = one.speed_mps[rows]
+    phase_start_s, phase_end_s = _phase_of(phases, float(one.time_s[rows[0]]), float(one.time_s[rows[-1]]))
     answer = StandstillScatter(
         start_s=float(one.time_s[rows[0]]),
         end_s=float(one.time_s[rows[-1]]),
@@ -139,6 +155,8 @@ def _judged(one: ReceiverRows, rows: NDArray[np.intp]) -> Stood:
         claimed_mps=_median(one.table.values("velocity_sigma_mps")[rows]),
         resolution_m=resolution_m,
         is_held=is_held,
+        phase_start_s=phase_start_s,
+        phase_end_s=phase_end_s,
     )
     return Stood(answer, rows, offset, averaged_s, scatter)
 

@@ -1,13 +1,25 @@
 """Words for a receiver's reception: the sentence, lengths, shares, times."""
 
 from collections.abc import Iterable
+from itertools import pairwise
 
 from groundstation.base.words import never_a_fix
-from groundstation.systems.gnss.answer import STATE_NAMES, WITHOUT_FIX, WITHOUT_RECORD, GnssReceiver, StandstillScatter
+from groundstation.systems.gnss.answer import (
+    STATE_NAMES,
+    WITHOUT_FIX,
+    WITHOUT_RECORD,
+    GnssReceiver,
+    ReceiverTexts,
+    StandstillScatter,
+    VelocityAgainstPosition,
+)
 
 FIXED = frozenset(STATE_NAMES) - {*WITHOUT_FIX, *WITHOUT_RECORD}
 WHOLE = 0.9995  # share that is all
 STEP_TOLD = 0.5  # of the scatter: a coarser step of the logged places is told
+BY_ACCURACY = ("rtk_fixed", "rtk_float", "dgnss", "3d")  # kinds of fix whose order of accuracy is known
+SAME_CLAIM = 1.1  # times the sigma of a better kind: a worse one claims as much
+LATE_S = 0.1  # a delay between position and velocity that is worth a line
 FEW = 4  # states that the sentence names
 CENTIMETRES_BELOW_M = 0.995
 
@@ -25,7 +37,8 @@ def sentence_of(one: GnssReceiver) -> str:
     told = [_first_fix(one) + listed((_states(one), _lost(one)))]
     if one.satellites_used is not None:
         told.append(f"{one.satellites_used:.0f} satellites")
-    if one.standstill is not None and (scatter := scatter_of(one.standstill)):
+    stood = one.told_standstill
+    if stood is not None and (scatter := scatter_of(stood, len(one.fixes) > 1)):
         told.append(scatter)
     return "; ".join(told)
 
@@ -62,17 +75,64 @@ def _times(what: str, seconds: list[float]) -> str:
     return f"{what} for {longest}" if len(seconds) == 1 else f"{what} {len(seconds)} times, at most {longest}"
 
 
-def scatter_of(stood: StandstillScatter) -> str:
-    """Return scatter at standstill beside what is claimed.
+def scatter_of(stood: StandstillScatter, names_kind: bool) -> str:
+    """Return scatter at standstill beside what is claimed, with its kind of fix where there are several.
 
     Empty where the receiver holds its place.
     """
     if stood.is_held:
         return ""
+    if names_kind:
+        seen = f"below {length_text(stood.resolution_m)}" if stood.is_coarse else length_text(stood.scatter_m)
+        claimed = "" if stood.claimed_m is None else f", {length_text(stood.claimed_m)} claimed"
+        return f"scatter {seen} while {name_of(stood.state)}{claimed}"
     claimed = "" if stood.claimed_m is None else f" where {length_text(stood.claimed_m)} is claimed"
     if stood.is_coarse:
         return f"scatter below {length_text(stood.resolution_m)}{claimed}"
     return f"scatter {length_text(stood.scatter_m)}{claimed}"
+
+
+def same_claims(one: GnssReceiver) -> str:
+    """Return that a worse kind of fix claims no larger sigma than a better one; empty where none does."""
+    fixes = [state for state in one.states if state.state in BY_ACCURACY and state.claimed_m is not None]
+    for better, worse in pairwise(fixes):
+        assert better.claimed_m is not None and worse.claimed_m is not None
+        if worse.claimed_m <= SAME_CLAIM * better.claimed_m:
+            worse_text, better_text = length_text(worse.claimed_m), length_text(better.claimed_m)
+            where = "as" if worse_text == better_text else f"and {better_text} is claimed while"
+            same = f"{name_of(worse.state)} claims {worse_text}, {where} {name_of(better.state)}"
+            return f"{same}{' does' * (where == 'as')}: the claimed σ does not tell them apart"
+    return ""
+
+
+def meaning_of(motion: VelocityAgainstPosition, too_sure: float) -> str:
+    """Return what the difference between velocity and position means beside the claimed sigma."""
+    rms, claimed = motion.difference_rms_mps, motion.claimed_mps
+    if claimed is None or not claimed > 0.0:
+        return "no σ of the velocity is claimed: the difference is not judged"
+    if rms <= claimed:
+        return "the difference is within the claimed σ"
+    told = f"the difference is {rms / claimed:.1f} times the claimed σ"
+    if motion.lag_s is not None and abs(motion.lag_s) > LATE_S and motion.left_rms_mps <= claimed:
+        return f"{told}: the delay of {abs(motion.lag_s):.2f} s explains it, {motion.left_rms_mps:.2f} m/s is left"
+    lasting = motion.lasting_rms_mps
+    if lasting is None:
+        return f"{told}: the log is too short to say whether it is noise from fix to fix"
+    if lasting <= claimed:
+        return f"{told}: noise from fix to fix explains it, {lasting:.2f} m/s is left over 10 s"
+    beyond = "noise from fix to fix does not explain all of it"
+    if lasting > too_sure * claimed:
+        beyond = "neither a delay nor noise from fix to fix explains it: the velocity is worse than claimed, or drifts"
+    return f"{told}: {beyond}, {lasting:.2f} m/s is left over 10 s"
+
+
+def texts_text(one: ReceiverTexts) -> str:
+    """Return how many texts a receiver sent, and the first one."""
+    topic = one.topic.removeprefix("raw.")
+    if one.count == 1:
+        return f'1 text of the receiver ({topic}): "{one.first}"'
+    which = "each" if one.different == 1 else "the first"
+    return f'{one.count} texts of the receiver ({topic}), {which}: "{one.first}"'
 
 
 def memory_of(stood: StandstillScatter) -> str:

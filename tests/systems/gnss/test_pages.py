@@ -35,6 +35,19 @@ def test_the_chapter_says_the_sentence_and_not_logged() -> None:
     assert "not logged" in text and section.claim.mark.text == "Good"
 
 
+def test_the_chapter_tells_scatter_by_kind_of_fix_and_what_is_left_out() -> None:
+    time_s = times()
+    kinds = np.where(time_s < 30.0, "rtk_fixed", np.where(time_s < 100.0, "rtk_float", "3d"))
+    section = gnss(results_of(table(time_s, fix=kinds, horizontal_sigma_m=np.full(len(time_s), 0.014))))
+    assert section is not None and section.claim is not None
+    text = markdown(section)
+    assert "Scatter at standstill by kind of fix" in text
+    assert "Single (3D): no standstill of 10 s, so no scatter." in text
+    assert "RTK fixed | 0:02 to 0:28 | 130" in text
+    assert text.count("as RTK fixed does") == 1
+    assert "No heading source in the log: track only." in section.claim.sentences
+
+
 def test_the_page_opens_with_what_is_against_the_reception() -> None:
     few = gnss(results_of(table(times(), satellites_used=np.full(len(times()), 4.0))))
     assert few is not None and few.claim is not None and few.claim.mark.tone == "bad"

@@ -7,10 +7,13 @@ import pytest
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
+from groundstation.integrity.ledger import gaps_of
+from groundstation.systems.gnss.answer import VelocityAgainstPosition
 from groundstation.systems.gnss.examine import shortfalls_of
 from groundstation.systems.gnss.settings import GnssSettings
+from groundstation.systems.gnss.wording_answer import meaning_of, same_claims
 from groundstation.tables.phases import PhaseInterval, Phases
-from groundstation.tables.table import Flight
+from groundstation.tables.table import Flight, Table
 from tests.systems.gnss.made import (
     STANDS_S,
     STEP_S,
@@ -165,6 +168,120 @@ def test_scatter_of_white_errors_is_the_sigma_and_has_no_memory() -> None:
     assert not stood.is_held and not stood.is_coarse
     sentence = answer(table(times(), place_m=noisy(0.02), horizontal_sigma_m=claimed)).sentence
     assert f"scatter {100.0 * stood.scatter_m:.1f} cm where 2.0 cm is claimed" in sentence
+
+
+def two_kinds(**columns: object) -> Table:
+    """A stand of 30 s RTK fixed with 0.01 m, then 30 s float with 0.04 m, and a drive in float."""
+    time_s = times()
+    place = np.where((time_s < 30.0)[:, None], noisy(0.01, seed=2), noisy(0.04, seed=3))
+    kinds = np.where(time_s < 30.0, "rtk_fixed", "rtk_float")
+    return table(time_s, place_m=place, fix=kinds, **columns)
+
+
+def test_each_kind_of_fix_has_its_scatter_and_the_sentence_names_it() -> None:
+    one = receiver(two_kinds(horizontal_sigma_m=np.full(len(times()), 0.014)))
+    fixed, floating = one.standstills
+    assert (fixed.state, floating.state) == ("rtk_fixed", "rtk_float")
+    assert fixed.scatter_m == pytest.approx(0.01, rel=0.2) and floating.scatter_m == pytest.approx(0.04, rel=0.2)
+    assert (fixed.start_s, fixed.end_s) == (pytest.approx(2.0, abs=0.3), pytest.approx(27.8, abs=0.3))
+    assert fixed.samples == pytest.approx((fixed.end_s - fixed.start_s) / STEP_S + 1.0, abs=0.5)
+    told = answer(two_kinds(horizontal_sigma_m=np.full(len(times()), 0.014))).sentence
+    assert told.endswith(f"scatter {100.0 * floating.scatter_m:.1f} cm while RTK float, 1.4 cm claimed")
+
+
+def test_a_worse_kind_that_claims_as_much_as_a_better_one_is_told() -> None:
+    time_s = times()
+    same = receiver(two_kinds(horizontal_sigma_m=np.full(len(time_s), 0.014)))
+    assert same_claims(same) == "RTK float claims 1.4 cm, as RTK fixed does: the claimed σ does not tell them apart"
+    assert codes(two_kinds(horizontal_sigma_m=np.full(len(time_s), 0.014)))["same_claim"] == "info"
+    honest = receiver(two_kinds(horizontal_sigma_m=np.where(time_s < 30.0, 0.014, 0.2)))
+    assert same_claims(honest) == "" and [one.claimed_m for one in honest.states] == [0.014, 0.2]
+
+
+def test_a_standstill_knows_the_one_of_the_overview_that_it_lies_in() -> None:
+    phases = Phases((PhaseInterval(0.0, 61.0, "standstill"), PhaseInterval(61.0, WHOLE_S, "driving")), "test")
+    stood = reception(table(times(), place_m=noisy(0.02)), phases=phases).answer.receiver.standstill
+    assert stood is not None and (stood.phase_start_s, stood.phase_end_s) == (0.0, 61.0)
+    assert stood.start_s == pytest.approx(2.0, abs=0.01) and stood.end_s < 60.5, "edges taken off"
+
+
+def sentences(time_s: np.ndarray, topic: str, hdop: float) -> Table:
+    time_ns = np.round((time_s + 0.05) * 1e9).astype(np.int64)
+    columns = {"HDOP": Column(np.full(len(time_s), hdop))}
+    return Table(topic, time_ns, columns, np.arange(len(time_s)), Column(time_ns))
+
+
+def test_hdop_of_sentences_is_that_of_the_receiver() -> None:
+    time_s = times()
+    bare = table(time_s, hdop=None)
+    one = receiver(bare, sentences(time_s, "raw.GNGGA", 0.62), sentences(time_s, "raw.GNGSA", 0.9))
+    assert (one.hdop, one.hdop_high, one.hdop_of) == (0.62, 0.62, "raw.GNGGA")
+    assert receiver(bare, sentences(time_s, "raw.GNGSA", 0.9)).hdop == 0.9
+    assert receiver(table(time_s), sentences(time_s, "raw.GNGGA", 0.62)).hdop == 0.8, "its own comes first"
+    assert receiver(bare, sentences(time_s + 1000.0, "raw.GNGGA", 0.62)).hdop is None, "of other epochs"
+    assert codes(bare, sentences(time_s, "raw.GNGGA", 4.0))["hdop_beyond"] == "warn"
+    other = replace(table(time_s, hdop=None), topic="gnss.2")
+    two = replace(bare, topic="gnss.1")
+    assert receiver(two, other, sentences(time_s, "raw.GNGGA", 0.62)).hdop is None, "of which receiver is not known"
+
+
+def test_subframes_that_satellites_send_irregularly_have_no_gaps() -> None:
+    """Steps of 0.25 and 0.75 s in turn, and 1 s now and then, are how they come."""
+    steps_s = np.tile([0.25, 0.75, 0.25, 0.25, 1.0, 0.25, 0.75, 0.25], 30)
+    time_ns = np.round(np.cumsum(steps_s) * 1e9).astype(np.int64)
+    assert len(gaps_of("raw.NAV-PVT", time_ns)), "of a topic with a rate they are lost"
+    for topic in ("raw.RXM-SFRBX", "raw.RXM-SFRBX.group", "raw.GNTXT", "raw.INF-NOTICE", "raw.MGA-10"):
+        assert not len(gaps_of(topic, time_ns)), topic
+
+
+def texts(topic: str, field: str, *said: str) -> Table:
+    time_ns = np.arange(len(said), dtype=np.int64) * 10**9
+    return Table(topic, time_ns, {field: Column(np.array(said))}, np.arange(len(said)), Column(time_ns))
+
+
+def test_texts_of_the_receiver_are_counted_and_told_once() -> None:
+    said = texts("raw.GNTXT", "text", *["NMEA unknown msg"] * 402)
+    found = reception(table(times()), said, texts("raw.INF-NOTICE", "message", "u-blox", "", "ANTSTATUS=OK"))
+    told = {one.topic: one for one in found.findings if one.code == "gnss.texts"}
+    assert told["raw.GNTXT"].text == '402 texts of the receiver (GNTXT), each: "NMEA unknown msg"'
+    assert (told["raw.GNTXT"].severity, told["raw.GNTXT"].count) == ("info", 402)
+    assert told["raw.INF-NOTICE"].text == '2 texts of the receiver (INF-NOTICE), the first: "u-blox"'
+    assert [(one.count, one.different) for one in found.answer.texts] == [(402, 1), (2, 2)]
+
+
+def test_a_receiver_alone_tells_no_heading() -> None:
+    assert not answer(table(times())).has_heading_source
+    assert answer(table(times(), "gnss.1"), table(times(), "gnss.2")).has_heading_source, "two antennas"
+    compass = replace(table(times(), true_heading_deg=np.zeros(len(times()))), topic="ins")
+    assert answer(table(times()), compass).has_heading_source
+    assert answer(table(times()), texts("raw.GPHDT", "headingT", "1.0")).has_heading_source
+
+
+@pytest.mark.parametrize(
+    ("rms", "left", "lasting", "lag_s", "told"),
+    [
+        (0.05, 0.05, 0.02, None, "the difference is within the claimed σ"),
+        (0.142, 0.053, 0.019, 0.131, "2.0 times the claimed σ: the delay of 0.13 s explains it, 0.05 m/s is left"),
+        (0.142, 0.14, 0.019, 0.02, "2.0 times the claimed σ: noise from fix to fix explains it, 0.02 m/s is left"),
+        (0.5, 0.5, 0.1, None, "noise from fix to fix does not explain all of it, 0.10 m/s is left over 10 s"),
+        (0.5, 0.5, 0.3, None, "neither a delay nor noise from fix to fix explains it"),
+        (0.5, 0.5, None, None, "too short to say"),
+    ],
+)
+def test_the_difference_of_velocity_has_a_meaning(
+    rms: float, left: float, lasting: float | None, lag_s: float | None, told: str
+) -> None:
+    motion = VelocityAgainstPosition(100.0, rms, left, lasting, 0.071, lag_s, None if lag_s is None else 0.003)
+    assert told in meaning_of(motion, 2.0)
+    assert "not judged" in meaning_of(replace(motion, claimed_mps=None), 2.0)
+
+
+def test_a_late_velocity_explains_its_difference() -> None:
+    time_s = times()
+    _place, velocity = motion(time_s - 0.25)
+    late = {"velocity_north_mps": velocity[:, 0], "velocity_east_mps": velocity[:, 1]}
+    one = receiver(table(time_s, velocity_sigma_mps=np.full(len(time_s), 0.1), **late))
+    assert one.motion is not None and "the delay of 0.25 s explains it" in meaning_of(one.motion, 2.0)
 
 
 def test_claims_that_are_too_small_are_a_warning() -> None:
