@@ -14,7 +14,7 @@ OPENS = {
     "dataflash/copter_3.6.7_log0041.BIN": (
         "bad",
         "Failed",
-        "control of attitude lost 1:17.6-1:20.5 (suspect motor, ESC or propeller of output 2)",
+        "control of attitude lost 1:17.6-1:20.5 with output 2 suspect",
         "21 s of GNSS missing",
     ),
     "dataflash/plane_4.2.3_pilot0004.BIN": ("bad", "Failed", "GNSS bad throughout", "GNSS at 5 Hz"),

@@ -121,7 +121,7 @@ def _part(check: Check, loss: AttitudeLoss | None = None, *, in_tenths: bool = F
     words = f"{special or (FAIL if check.verdict == 'fail' else WARN)[check.key]}{when(check, in_tenths=in_tenths)}"
     is_lost = check.decisive is not None and check.decisive.quantity == LOST
     if is_lost and loss is not None and loss.suspect is not None:
-        return f"{words} (suspect motor, ESC or propeller of output {loss.suspect})"
+        return f"{words} with output {loss.suspect} suspect (motor, ESC or propeller)"
     return words
 
 
