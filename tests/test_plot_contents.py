@@ -20,7 +20,7 @@ NOT_KEPT = {
     *("landing_ranges.space", "landing_ranges.accuracy", "landing_ranges.trials"),
     *("together.motion", "reference.errors", "reference.track", "reference.claims"),
     *("fleet.deviation", "fleet.installation", "fleet.units", "gnss.pair"),
-    *("health.lanes", "health.panels"),  # no case has an autopilot: tests/systems/health/test_pages.py
+    *("health.lanes", "health.motors", "health.panels"),  # no case has an autopilot: tests/systems/health/test_pages.py
     *("overview-pressure_altitude_m", "session_errors-two_sigma_r_m", "session_errors-rms_error_m"),
     *("overview-pressure_altitude_m-difference", "session_errors-two_sigma_r_m-difference"),
     "session_errors-rms_error_m-difference",

@@ -11,7 +11,12 @@ from tests.real_logs import real_log
 # Log: colour, word, part of the headline, part of the line on the recording.
 OPENS = {
     "dataflash/erle_plane_4-12-2014_329.BIN": ("warn", "Left GNSS", "EKF1 and GNSS up to 181 m", "its end is cut off"),
-    "dataflash/copter_3.6.7_log0041.BIN": ("bad", "Failed", "Estimators disagree 1:18", "21 s of GNSS missing"),
+    "dataflash/copter_3.6.7_log0041.BIN": (
+        "bad",
+        "Failed",
+        "control of attitude lost 1:17.6-1:20.5 with output 2 suspect",
+        "21 s of GNSS missing",
+    ),
     "dataflash/plane_4.2.3_pilot0004.BIN": ("bad", "Failed", "GNSS bad throughout", "GNSS at 5 Hz"),
     "ulog/px4_rs_esc_status.ulg": ("warn", "Warnings", "Vibration raised 0:12", "40 s of GNSS"),
     "ulog/quadrotor_local.ulg": ("bad", "Failed", "“Low battery” at 1:19", "never a fix"),

@@ -4,8 +4,7 @@ from collections.abc import Iterator
 
 from groundstation.chapters.chapter import Advice
 from groundstation.results.flight import FlightResults
-from groundstation.systems.health.answer import AttitudeLoss, AutopilotHealth
-from groundstation.systems.health.ending import FALL
+from groundstation.systems.health.answer import FALL, AttitudeLoss, AutopilotHealth
 
 LOSS, FELL = "lost attitude", "fall"
 SENSORS = {  # checks that, failed before the loss, are inspected too

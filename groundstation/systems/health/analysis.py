@@ -12,7 +12,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.results.answer import Answers, answer_of
 from groundstation.systems.analysis import Analysis, Found, Shortfall
-from groundstation.systems.health.answer import HEADLINES, AttitudeLoss, AutopilotHealth, Check, Happening
+from groundstation.systems.health.answer import HEADLINES, LOST, AttitudeLoss, AutopilotHealth, Check, Happening
 from groundstation.systems.health.columns import COLUMNS
 from groundstation.systems.health.settings import HealthSettings
 from groundstation.systems.known import Known
@@ -142,9 +142,8 @@ def _checked(flight: "Flight", known: Known, settings: HealthSettings) -> _Check
 
 
 def _loss(flight: "Flight", judged: "Sequence[Judged]") -> "tuple[AttitudeLoss | None, Motors | None]":
-    """Return the first loss of control of attitude that failed its check, and the motors' outputs."""
+    """Return the first loss of attitude that failed its check, and the motors' outputs."""
     from groundstation.systems.health.motors import at_the_loss, motors_of
-    from groundstation.systems.health.sentence import LOST
 
     lost = [one for one in judged if one.measure.quantity == LOST and one.measure.verdict == "fail"]
     if not lost:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
+from groundstation.base.words import clock_text, tenths_text
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.frames import Brief
@@ -12,6 +13,9 @@ NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not o
 
 Verdict = Literal["pass", "warn", "fail", "not_logged"]
 HEADLINES: Mapping[Verdict, str] = {"pass": "Healthy", "warn": "Warnings", "fail": "Failed", "not_logged": "Not logged"}
+FALL = "log ends in the air"  # how the text of a fall begins
+LOST = "attitude_lost_deg"  # quantity of the tracking check
+IN_TENTHS_S = 10.0  # a shorter span is told in tenths of a second
 WHOLE_LOG = "in the whole log"  # what is judged where nothing says that it flew
 FIRST = ("gnss", "innovations", "vibration")  # checks that a flight's sentence and chapter always tell
 
@@ -259,7 +263,7 @@ class AttitudeLoss:
 
     @property
     def told(self) -> str:
-        """Highest and lowest output with their limits, and what they point to; empty without outputs."""
+        """Highest and lowest output with their limits; empty without outputs."""
         if not self.motors:
             return ""
         highest = max(self.motors, key=lambda one: one.thrust)
@@ -326,3 +330,24 @@ class AutopilotHealth(Answer):
     def check(self, key: str) -> Check:
         """Return the check of that key."""
         return next(one for one in self.checks if one.key == key)
+
+
+def gravity(check: Check) -> tuple[bool, bool, bool]:
+    """Return what orders the checks.
+
+    Failed ones come first, of those a lost attitude, then GNSS, filter and vibration.
+    """
+    is_lost = check.decisive is not None and check.decisive.quantity == LOST
+    return check.verdict != "fail", not is_lost, check.key not in FIRST
+
+
+def span_words(start_s: float, end_s: float) -> tuple[str, str]:
+    """Return start and end of a span: in tenths of a second where it is shorter than ten.
+
+    Examples
+    --------
+    >>> span_words(77.61, 80.51), span_words(723.0, 759.0)
+    (('1:17.6', '1:20.5'), ('12:03', '12:39'))
+    """
+    told = tenths_text if end_s - start_s < IN_TENTHS_S else clock_text
+    return told(start_s), told(end_s)

@@ -69,7 +69,10 @@ def battery(flight: Flight) -> Iterator[Evidence]:
 
 
 def used(quantity: str, source: str, time_ns: Int64Array, value: FloatArray, instance: int) -> Iterator[Evidence]:
-    """Yield voltage or current of a battery as they are; of one that has no current or a few volts nothing."""
+    """Yield voltage or current of a battery as it is.
+
+    A battery of a few volts, or without current, is none.
+    """
     is_volt = quantity == "battery_v"
     value = np.where(value > (LEAST_VOLT if is_volt else -1.0), value, np.nan)
     if np.any(value > 0.0):

@@ -242,7 +242,7 @@ def _biases(
 
 
 def _differences(flight: Flight, used: EstimatorInUse | None) -> Iterator[Evidence]:
-    """Yield what parts AHR2, the estimator beside it, from the attitude and position that flew."""
+    """Yield what parts AHR2, the estimator beside it, from what flew."""
     if "raw.AHR2" not in flight or "raw.ATT" not in flight:
         return
     second, first = flight["raw.AHR2"], flight["raw.ATT"]

@@ -1,4 +1,4 @@
-"""What the batteries did in words: lowest voltage and largest current with their times, before and after a loss."""
+"""Words on batteries: lowest voltage, largest current, their times, before a loss."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

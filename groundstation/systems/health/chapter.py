@@ -10,9 +10,18 @@ from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Cell, Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, Tone
 from groundstation.chapters.wording import ABSENT, clean, clock, number, percent, significant, typeset
 from groundstation.results.flight import FlightResults
-from groundstation.systems.health.answer import FIRST, HEADLINES, AutopilotHealth, Check, Happening, Measure, Verdict
+from groundstation.systems.health.answer import (
+    FIRST,
+    HEADLINES,
+    AutopilotHealth,
+    Check,
+    Happening,
+    Measure,
+    Verdict,
+    gravity,
+    span_words,
+)
 from groundstation.systems.health.plots import SIGNS, sign_of
-from groundstation.systems.health.sentence import gravity, span_words
 
 TITLE = "Autopilot health"
 LEAD = "Was GNSS good, was the filter healthy, and what went wrong when."

@@ -42,7 +42,10 @@ ONLY_FLOWN = ("tracking", "saturation")  # on the ground nothing follows its set
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """Evidence with its grade over time: 0 fine, 1 amber, 2 red, -1 absent; whether in the air. Shapes (n,)."""
+    """Evidence with its grade over time, arrays of shape (n,).
+
+    Grades: 0 fine, 1 amber, 2 red, -1 absent.
+    """
 
     evidence: Evidence
     measure: Measure

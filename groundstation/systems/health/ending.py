@@ -6,12 +6,12 @@ import numpy as np
 
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
+from groundstation.systems.health.answer import FALL
 from groundstation.systems.health.evidence import Event, Spans
 from groundstation.tables.table import Flight
 
 LAST_S = 1.0  # of the log: its median is the rate of descent at the end
 SINKS_MPS = 8.0  # ours: a multirotor lowers itself by 1 to 3 m/s, a plane on approach by 1 to 4
-FALL = "log ends in the air"
 DOWN = "velocity_down_mps"
 
 

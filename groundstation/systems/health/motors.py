@@ -1,4 +1,4 @@
-"""Outputs to the motors of a multirotor, their limits, and the motor that a lost attitude points to.
+"""Outputs to the motors of a multirotor, and the one that a lost attitude points to.
 
 A motor without thrust lets its arm sink, and the controller commands it up and the one opposite down. So the output
 that stands high, alone and steadily, is that of the suspect.
@@ -83,7 +83,10 @@ def cannot_taxi(flight: Flight) -> bool:
 
 
 def motors_of(flight: Flight) -> Motors | None:
-    """Return the outputs to the motors; None where the log does not tell which they are, or their limits."""
+    """Return the outputs to the motors.
+
+    None where the log does not tell which they are, or their limits.
+    """
     return _ardupilot(flight) if "raw.RCOU" in flight else _px4(flight)
 
 
@@ -152,7 +155,10 @@ def _px4(flight: Flight) -> Motors | None:
 
 
 def _px4_pulses(parameters: Parameters, values: list[FloatArray], count: int) -> Iterator[Motor]:
-    """Yield the motors among PWM outputs: by their functions (from 1.13), else the first of a multirotor."""
+    """Yield the motors among PWM outputs.
+
+    By their functions (from 1.13), else the first of a multirotor.
+    """
     functions = [parameters.value(f"PWM_MAIN_FUNC{number}") for number in range(1, OUTPUTS + 1)]
     has_functions = any(one is not None for one in functions)
     for number, (value, function) in enumerate(zip(values, functions, strict=True), start=1):
@@ -164,9 +170,9 @@ def _px4_pulses(parameters: Parameters, values: list[FloatArray], count: int) ->
 
 
 def at_limit(motors: Motors) -> FloatArray:
-    """Return 1 where a motor is at its highest, or at its lowest while another is beyond half: 1, 0 or NaN.
+    """Return 1 where a motor is at a limit, else 0, NaN where nothing is known.
 
-    All low together are a descent, and no limit of control.
+    Its lowest counts while another is beyond half. All low together are a descent, and no limit of control.
     """
     share = np.column_stack([one.travel for one in motors.each])
     known = np.isfinite(share).any(axis=1)

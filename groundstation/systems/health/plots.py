@@ -77,7 +77,7 @@ def panels(results: FlightResults, key: str) -> Plot | None:
 
 
 def motors(results: FlightResults) -> Plot | None:
-    """Return the outputs to the motors around the loss of control of attitude; None without one."""
+    """Return the outputs to the motors around the loss of attitude; None without one."""
     answer, data = results.answer(AutopilotHealth), results.rows_of(HealthMotors)
     if answer is None or answer.loss is None or data is None or not answer.loss.motors:
         return None

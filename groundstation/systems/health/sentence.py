@@ -7,12 +7,10 @@ import re
 from collections.abc import Mapping, Sequence
 
 from groundstation.base.words import clock_text, listed, tenths_text
-from groundstation.systems.health.answer import FIRST, AttitudeLoss, Check
+from groundstation.systems.health.answer import FIRST, IN_TENTHS_S, LOST, AttitudeLoss, Check, gravity, span_words
 
 MOST_BAD = 4
-LOST = "attitude_lost_deg"
 MORE = re.compile(r" and \d+ more$")
-IN_TENTHS_S = 10.0  # a shorter span is told in tenths of a second
 APART_S = 0.05  # failures that begin nearer have no order
 THROUGHOUT = " throughout"
 MOSTLY = 0.8  # of the time: a longer span is "throughout"
@@ -112,15 +110,6 @@ def _by_time(bad: Sequence[Check], loss: AttitudeLoss | None) -> list[str]:
     return [*before, f"first: {timed[0]}", f"then {timed[1]}", *timed[2:], *after]
 
 
-def gravity(check: Check) -> tuple[bool, bool, bool]:
-    """Return what orders the checks.
-
-    Failed ones come first, of those a lost attitude, then GNSS, filter and vibration.
-    """
-    is_lost = check.decisive is not None and check.decisive.quantity == LOST
-    return check.verdict != "fail", not is_lost, check.key not in FIRST
-
-
 def _part(check: Check, loss: AttitudeLoss | None = None, *, in_tenths: bool = False) -> str:
     if check.verdict == "pass":
         return GOOD.get(check.key, "")
@@ -132,7 +121,7 @@ def _part(check: Check, loss: AttitudeLoss | None = None, *, in_tenths: bool = F
     words = f"{special or (FAIL if check.verdict == 'fail' else WARN)[check.key]}{when(check, in_tenths=in_tenths)}"
     is_lost = check.decisive is not None and check.decisive.quantity == LOST
     if is_lost and loss is not None and loss.suspect is not None:
-        return f"{words} (suspect motor, ESC or propeller of output {loss.suspect})"
+        return f"{words} with output {loss.suspect} suspect (motor, ESC or propeller)"
     return words
 
 
@@ -170,15 +159,3 @@ def when(check: Check, *, in_tenths: bool = False) -> str:
         return THROUGHOUT
     start, end = span_words(measure.span_start_s, measure.span_end_s)
     return f" at {start}" if start == end else f" {start}-{end}"
-
-
-def span_words(start_s: float, end_s: float) -> tuple[str, str]:
-    """Return start and end of a span: in tenths of a second where it is shorter than ten.
-
-    Examples
-    --------
-    >>> span_words(77.61, 80.51), span_words(723.0, 759.0)
-    (('1:17.6', '1:20.5'), ('12:03', '12:39'))
-    """
-    told = tenths_text if end_s - start_s < IN_TENTHS_S else clock_text
-    return told(start_s), told(end_s)
