@@ -76,7 +76,7 @@ def _times(what: str, seconds: list[float]) -> str:
 
 
 def scatter_of(stood: StandstillScatter, names_kind: bool) -> str:
-    """Return scatter at standstill beside the claim, with the kind of fix where there are more.
+    """Return scatter at standstill beside the claim, with the kind of fix where asked.
 
     Empty where the receiver holds its place.
     """
