@@ -189,7 +189,7 @@ def _of(one: GnssReceiver, answer: GnssReception) -> str:
 
 
 def _standstill(one: GnssReceiver, answer: GnssReception) -> list[Part | None]:
-    """Return scatter beside the claim, a row for each kind of fix, and the figure of the kind held most."""
+    """Return scatter beside the claim, a row for each kind of fix, and the figure."""
     every = one.standstills or ((one.standstill,) if one.standstill is not None else ())
     if not every:
         return []
