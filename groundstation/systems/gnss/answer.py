@@ -261,7 +261,7 @@ class ReceiverPair:
 
 @dataclass(frozen=True)
 class ReceiverTexts:
-    """Texts of the receiver in one topic (NMEA TXT, UBX INF): how many, how many differ, the first one."""
+    """Texts of the receiver in one topic: how many, how many differ, the first one."""
 
     topic: str
     count: int

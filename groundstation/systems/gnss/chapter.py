@@ -97,7 +97,7 @@ def _claim(answer: GnssReception) -> Claim:
 
 
 def _same_claims(answer: GnssReception) -> list[str]:
-    """Return that a worse kind of fix claims as much as a better one, of each receiver that does."""
+    """Return which receivers claim as much of a worse kind of fix as of a better one."""
     told = [(one, same_claims(one)) for one in answer.receivers]
     return [f"{one.topic}: {same}" if len(answer.receivers) > 1 else same for one, same in told if same]
 
@@ -189,7 +189,7 @@ def _of(one: GnssReceiver, answer: GnssReception) -> str:
 
 
 def _standstill(one: GnssReceiver, answer: GnssReception) -> list[Part | None]:
-    """Return scatter beside the claim, a row for each kind of fix, and the figure of the kind held most."""
+    """Return scatter beside the claim, a row for each kind of fix, and the figure."""
     every = one.standstills or ((one.standstill,) if one.standstill is not None else ())
     if not every:
         return []
@@ -233,7 +233,7 @@ def _beside(value: str, claimed: str | None) -> str:
 
 
 def _edges(one: GnssReceiver, every: tuple[StandstillScatter, ...], answer: GnssReception) -> list[str]:
-    """Return why a standstill is shorter here than in the overview, and which kinds of fix had none."""
+    """Return why a standstill is shorter than in the overview, and kinds without one."""
     told = []
     spans = [(stood.phase_start_s, stood.phase_end_s) for stood in every]
     shown = dict.fromkeys(f"{clock(start)} to {clock(end)}" for start, end in spans if start is not None)

@@ -148,7 +148,7 @@ def series_of(flight: Flight, topic: str, settings: GnssSettings) -> ReceiverRow
 
 
 def _with_hdop(flight: Flight, table: Table) -> tuple[Table, str]:
-    """Return rows with the HDOP of NMEA sentences of the same epochs where they have none, and its topic.
+    """Return rows with the HDOP of NMEA sentences where they have none, and its topic.
 
     Of a log with several receivers nothing says whose sentences they are.
     """

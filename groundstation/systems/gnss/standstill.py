@@ -34,7 +34,7 @@ class Stood(NamedTuple):
 
 
 def standstills_of(one: ReceiverRows, phases: Phases, settings: GnssSettings) -> tuple[Stood, ...]:
-    """Return the longest standstill of each kind of fix, the best kind first; empty without one long enough."""
+    """Return the longest standstill of each kind of fix, the best kind first."""
     if len(one.time_s) < settings.standstill_samples_min:
         return ()
     still = _is_still(one, settings) & ~np.isin(phases.at(one.time_s), IN_MOTION)
@@ -62,7 +62,7 @@ def standstills_of(one: ReceiverRows, phases: Phases, settings: GnssSettings) ->
 
 
 def longest_of(stood: tuple[Stood, ...]) -> Stood | None:
-    """Return the longest standstill, of the better kind of fix where two are as long; None without any."""
+    """Return the longest standstill, of the better kind where two are as long; else None."""
     return max(stood, key=lambda one: one.answer.end_s - one.answer.start_s, default=None)
 
 

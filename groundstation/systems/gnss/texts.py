@@ -31,7 +31,7 @@ def finding_of(one: ReceiverTexts) -> Finding:
 
 
 def has_heading_source(flight: Flight) -> bool:
-    """Tell whether a log has more than one receiver that is alone, which tells a track and no heading."""
+    """Tell whether a log has more than one receiver alone, which tells no heading."""
     topics = flight.topics()
     own = [topic for topic in topics if is_canonical(topic) and kind_of(topic) != "event"]
     if len(own) != 1 or kind_of(own[0]) != "gnss":

@@ -76,7 +76,7 @@ def _times(what: str, seconds: list[float]) -> str:
 
 
 def scatter_of(stood: StandstillScatter, names_kind: bool) -> str:
-    """Return scatter at standstill beside what is claimed, with its kind of fix where there are several.
+    """Return scatter at standstill beside the claim, with the kind of fix where asked.
 
     Empty where the receiver holds its place.
     """
@@ -93,7 +93,7 @@ def scatter_of(stood: StandstillScatter, names_kind: bool) -> str:
 
 
 def same_claims(one: GnssReceiver) -> str:
-    """Return that a worse kind of fix claims no larger sigma than a better one; empty where none does."""
+    """Return that a worse kind of fix claims no larger sigma than a better one; else empty."""
     fixes = [state for state in one.states if state.state in BY_ACCURACY and state.claimed_m is not None]
     for better, worse in pairwise(fixes):
         assert better.claimed_m is not None and worse.claimed_m is not None
