@@ -1,5 +1,6 @@
 """What each verb loads: modules that it does not need cost every user their time. No time is measured here."""
 
+import ast
 import os
 import subprocess
 import sys
@@ -130,3 +131,22 @@ def test_linear_algebra_has_one_thread_before_numpy_is_loaded(asked: dict[str, s
     environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")} | asked
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
     assert done.stdout.split() == ["False", threads]
+
+
+def test_a_flight_is_estimated_without_scipy_signal() -> None:
+    """It takes longer to import than the rest of scipy together; simulation and studies may have it."""
+    package = Path(__file__).parents[1] / "groundstation"
+    files = [path for room in ("systems", "methods", "tables") for path in (package / room).rglob("*.py")]
+    estimating = [path for path in files if "study" not in str(path.relative_to(package))]
+    assert len(estimating) > 100
+    users = [
+        path.name for path in estimating if "scipy.signal" in imports_of(path) or "scipy.stats" in imports_of(path)
+    ]
+    assert users == []
+
+
+def imports_of(path: Path) -> set[str]:
+    """Return the modules that a file imports, inside functions too."""
+    nodes = list(ast.walk(ast.parse(path.read_text())))
+    plain = {name.name for node in nodes if isinstance(node, ast.Import) for name in node.names}
+    return plain | {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)}
