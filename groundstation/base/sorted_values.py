@@ -13,7 +13,7 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 def distinct(values: NDArray[Scalar]) -> NDArray[Scalar]:
-    """Return the distinct values as ``np.unique`` does: rising, shape (k,), NaN once at the end.
+    """Return the distinct values, rising, shape (k,), as ``np.unique`` does: NaN once.
 
     Examples
     --------

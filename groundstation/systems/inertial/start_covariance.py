@@ -96,7 +96,7 @@ def _windowed(method: str, run: ChannelsRun, at: Int64Array, channel: int, setti
 def _window_factors(
     method: str, lags: FloatArray, phi: FloatArray, lengths_s: tuple[float, ...]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the factors of the estimate at each lag in d, and in what younger ones share with it.
+    """Return factors of the estimate at each lag in d, and in what younger ones share.
 
     Both have the shape (lags, 6, 6). An estimate is correlated with a younger one as with itself carried to it.
     """
@@ -153,7 +153,10 @@ def lead_growth(run: ChannelsRun, lead_s: FloatArray) -> LeadGrowth:
 
 @lru_cache(KEPT_GROWTHS)
 def _grown(model: ChannelModel, density: tuple[float, ...], step_s: float, leads: int) -> tuple[FloatArray, FloatArray]:
-    """Return rows (l, 6) of Phi and variances (l,) added by noise, over leads in equal steps; both read-only."""
+    """Return rows (l, 6) of Phi and variances (l,) added by noise, both read-only.
+
+    They are over leads in equal steps.
+    """
     rows, added = np.zeros((leads, SIZE)), np.zeros(leads)
     phi = model.transition_over(step_s)
     once = model.process_noise_over(step_s, np.array(density))

@@ -68,7 +68,7 @@ def matched_run(seed: int, number: int, *, duration_s: int = DURATION_S, uses_ve
 
 
 def _judged(job: tuple[int, int, bool]) -> tuple[list[float], FloatArray, Int64Array]:
-    """Return the NEES of a run at some times, and the sums and counts of its NIS, both shape (2,)."""
+    """Return the NEES of a run at some times, and sums and counts of its NIS, shape (2,)."""
     seed, number, uses_velocity = job
     matched = matched_run(seed, number, uses_velocity=uses_velocity)
     ratio = np.square(matched.run.innovation) / matched.run.innovation_variance
