@@ -48,7 +48,7 @@ NAMES = (
     "cooperative-map cooperative-errors cooperative-geometry cooperative-links "
     "control-paths control-measures control-law placement-map placement-accuracy "
     "units-errors units-pairs units-radial causes-along causes-velocity "
-    "gnss-states gnss-quality gnss-standstill gnss-steps gnss-pair health-lanes health-panels "
+    "gnss-states gnss-quality gnss-standstill gnss-steps gnss-pair health-lanes health-motors health-panels "
     "trajectory-attitude trajectory-biases trajectory-map trajectory-onboard-attitude trajectory-onboard-motion "
     "trajectory-outages trajectory-residuals trajectory-separation trajectory-sigmas"
 )

@@ -142,7 +142,7 @@ def _checked(flight: "Flight", known: Known, settings: HealthSettings) -> _Check
 
 
 def _loss(flight: "Flight", judged: "Sequence[Judged]") -> "tuple[AttitudeLoss | None, Motors | None]":
-    """Return the first loss of attitude that failed its check, and the motors' outputs."""
+    """Return the first loss of attitude that failed its check, and the motor outputs."""
     from groundstation.systems.health.motors import at_the_loss, motors_of
 
     lost = [one for one in judged if one.measure.quantity == LOST and one.measure.verdict == "fail"]

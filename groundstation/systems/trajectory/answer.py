@@ -30,6 +30,7 @@ TrajectoryState = Literal["accepted", "doubtful", "ambiguous"]
 MountingSource = Literal["stated", "logged", "found", "case"]
 # Names of parameters that others read: of the lever arm, and of the receiver's delay.
 ARM = ("antenna forward of the unit", "antenna right of the unit", "antenna down of the unit")
+TRAVEL = ("travel in the unit, yaw", "travel in the unit, pitch")
 LATENCY, VELOCITY_LAG = "GNSS latency", "GNSS velocity behind its position"
 
 
@@ -55,6 +56,11 @@ class UnitMounting:
         Rotation from the axes of the case to those of the body.
     sigma_deg : float or None
         None where it is stated or not known.
+    off_deg : float or None
+        Angle of the travel from forward of these axes, where what rolls shows that the unit stands turned in the
+        vehicle beyond 95 %: the attitude is then that of the unit. None else, and where the mounting is stated.
+    to_state_deg : three floats or None
+        ``imu_mounting_deg`` of the aircraft file that takes that angle off.
     """
 
     source: MountingSource
@@ -63,6 +69,8 @@ class UnitMounting:
     pitch_deg: float = 0.0
     yaw_deg: float = 0.0
     sigma_deg: float | None = None
+    off_deg: float | None = None
+    to_state_deg: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True)

@@ -67,6 +67,25 @@ def angles_of(rotation: FloatArray) -> FloatArray:
     return angles
 
 
+def with_travel_forward(body_from_case: FloatArray, yaw_deg: float, pitch_deg: float) -> FloatArray:
+    """Return the turn after which a direction of travel lies forward, shape (3, 3).
+
+    Parameters
+    ----------
+    body_from_case : ndarray, shape (3, 3)
+    yaw_deg, pitch_deg : float
+        Of the travel in the axes that ``body_from_case`` gives: to the right, and up. The roll about it stays.
+
+    Examples
+    --------
+    >>> case_aft_up = from_angles((180.0, 0.0, 180.0))
+    >>> angles_of(with_travel_forward(case_aft_up, 5.0, 7.0)).round(2).tolist()
+    [180.0, 6.97, -175.04]
+    """
+    turned: FloatArray = from_angles((0.0, pitch_deg, yaw_deg)).T @ body_from_case
+    return turned
+
+
 def angle_between_deg(one: FloatArray, other: FloatArray) -> FloatArray:
     """Return the angles between rotations, shape (...), in degrees.
 

@@ -14,9 +14,10 @@ from groundstation.chapters.wording import (
     typeset,
 )
 from groundstation.results.flight import FlightResults
-from groundstation.systems.trajectory.answer import BestTrajectory, TrajectoryParameter, UnitMounting
+from groundstation.systems.trajectory.answer import TRAVEL, BestTrajectory, TrajectoryParameter, UnitMounting
 from groundstation.systems.trajectory.checks_answer import InnovationRow
 from groundstation.systems.trajectory.claim_chapter import (
+    axes_texts,
     claim_of,
     full_sentence,
     inside_texts,
@@ -51,6 +52,7 @@ def trajectory(results: FlightResults) -> Section | None:
         *_doubt(answer),
         _hypotheses(answer),
         *_told_of_filter(answer),
+        *(Note(full_sentence(text), "warn") for text in axes_texts(answer)),
         _accuracy(answer),
         Figure("trajectory.map"),
         Figure("trajectory.onboard_attitude"),
@@ -257,8 +259,8 @@ def _outages(answer: BestTrajectory) -> Grid | None:
         (
             number(one.length_s, 0),
             number(one.count, 0),
-            _with(one.smoothed_rms_m, "m"),
-            _with(one.forward_end_rms_m, "m"),
+            _rms_and_worst(one.smoothed_rms_m, one.smoothed_worst_m),
+            _rms_and_worst(one.forward_end_rms_m, one.forward_end_worst_m),
             percent(one.inside95_share),
             number(one.rms_over_sigma, 2),
             _with(one.vertical_rms_m, "m"),
@@ -266,10 +268,21 @@ def _outages(answer: BestTrajectory) -> Grid | None:
         )
         for one in answer.outages
     ]
-    caption = f"GNSS is withheld from this log; truth is the {answer.outage_truth}. Horizontal, but for the height."
-    if answer.outage_truth == "undisturbed solution":
-        caption += " It is the same solution with GNSS: what GNSS itself has wrong is in both."
+    caption = (
+        "GNSS is withheld from this log. Errors are those against the solution with GNSS, horizontal but for the "
+        "height. Smoothed: in post-processing, by the data before and behind. Forward filter: live, by the data before "
+        "alone. Other columns are of the smoothed solution."
+    )
+    if answer.outage_truth == "RTK":
+        caption += " Its GNSS is RTK."
+    else:
+        caption += " What GNSS itself has wrong is in both."
     return Grid("Outages of GNSS, replayed", heads, rows, caption, ("trajectory_outages",))
+
+
+def _rms_and_worst(rms_m: float | None, worst_m: float | None) -> str:
+    worst = "" if worst_m is None else f", worst {_with(worst_m, 'm')}"
+    return f"{_with(rms_m, 'm')}{worst}"
 
 
 def _checks(answer: BestTrajectory) -> Grid | None:
@@ -338,6 +351,8 @@ def _parameters(answer: BestTrajectory) -> Grid | None:
         Head("Observable"),
     )
     caption = "Values at the end of the log, in the axes of the body. What is not observable is as it was assumed."
+    if any(one.name in TRAVEL for one in answer.parameters):
+        caption += " Travel in the unit: direction in which the vehicle goes straight on, right and up of the unit."
     return Grid("Parameters found", heads, [_parameter(one) for one in answer.parameters], caption)
 
 

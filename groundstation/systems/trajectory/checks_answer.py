@@ -85,6 +85,8 @@ class OutageRow:
         Replayed altogether.
     vertical_rms_m, vertical_inside95_share : float or None
         Likewise of the height.
+    smoothed_worst_m, forward_end_worst_m : float or None
+        Largest of the outages.
     """
 
     length_s: float
@@ -96,6 +98,8 @@ class OutageRow:
     seconds: float
     vertical_rms_m: float | None = None
     vertical_inside95_share: float | None = None
+    smoothed_worst_m: float | None = None
+    forward_end_worst_m: float | None = None
 
 
 @dataclass(frozen=True)

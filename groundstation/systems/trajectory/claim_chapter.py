@@ -4,11 +4,12 @@ from collections.abc import Mapping
 
 from groundstation.base.words import with_half
 from groundstation.chapters.parts import Claim, Mark, Rank
-from groundstation.chapters.wording import number, number_with_unit, significant, typeset, with_full_stop
+from groundstation.chapters.wording import number_with_unit, significant, typeset, with_full_stop
 from groundstation.systems.trajectory.answer import BestTrajectory, TrajectoryState
 from groundstation.systems.trajectory.checks_answer import OutageRow
 from groundstation.systems.trajectory.wording_answer import (
     accuracy_words,
+    axes_words,
     change_words,
     error_words,
     opening_change,
@@ -37,7 +38,9 @@ def claim_of(answer: BestTrajectory) -> Claim:
     if changed is not None:
         row, change = changed, changed.changes[0]
         value = typeset(with_half(change.by, change.half95, row.unit))
-        sentences = [full_sentence(f"best trajectory: {accuracy_words(answer)}")]
+        sentences = [
+            full_sentence(text) for text in (f"best trajectory: {accuracy_words(answer)}", *axes_texts(answer))
+        ]
         remark, headline = f"on-board {row.quantity}, changed", _headline(sentence_of(answer))
         return Claim(Rank.ONBOARD_ERROR, CHANGED, headline, value, remark, sentences, figures)
     if worst is not None:
@@ -49,7 +52,8 @@ def claim_of(answer: BestTrajectory) -> Claim:
         value = typeset(with_half(span.value, span.half95, row.unit))
         remark = f"on-board {row.quantity} wrong {when(answer, span)}"
         others = [text for text in wrong_texts(answer) if text != error_words(answer, row, span)]
-        sentences = [full_sentence(text) for text in (*others, f"best trajectory: {accuracy_words(answer)}")]
+        told = (*others, f"best trajectory: {accuracy_words(answer)}", *axes_texts(answer))
+        sentences = [full_sentence(text) for text in told]
         headline = _headline(error_words(answer, row, span))
         return Claim(Rank.ONBOARD_ERROR, WRONG, headline, value, remark, sentences, figures, is_danger=is_danger)
     mark, headline = MARKS[answer.state], _headline(sentence_of(answer))
@@ -57,8 +61,13 @@ def claim_of(answer: BestTrajectory) -> Claim:
         return Claim(Rank.TRACK_OPEN, mark, headline, "", "", _reasons_left(answer), figures)
     heading = answer.accuracy_of("heading")
     value = "" if heading is None else f"± {rounded(heading.median_within95)}°"
-    sentences = [full_sentence(text) for text in inside_texts(answer)]
+    sentences = [full_sentence(text) for text in (*axes_texts(answer), *inside_texts(answer))]
     return Claim(Rank.TRACK, mark, headline, value, "heading, 95 %", sentences, figures)
+
+
+def axes_texts(answer: BestTrajectory) -> list[str]:
+    """Return whose attitude it is, where it is not that of the vehicle."""
+    return [text] if (text := axes_words(answer)) else []
 
 
 def _reasons_left(answer: BestTrajectory) -> list[str]:
@@ -75,9 +84,23 @@ def _figures(answer: BestTrajectory) -> list[tuple[str, str, str]]:
             found.append((label, f"± {number_with_unit(rounded(row.median_within95), unit_sign_of(row.unit))}", "95 %"))
     longest = _outage_told(answer)
     if longest is not None and answer.state == "accepted":
-        remark = f"largest error, RMS of {longest.count}"
-        found.append((f"Outage of {longest.length_s:g} s", number(longest.smoothed_rms_m, 1, "m"), remark))
+        found.append((f"Outage of {longest.length_s:g} s", *_outage_figure(longest)))
     return found
+
+
+def _outage_figure(row: OutageRow) -> tuple[str, str]:
+    """Return the error of outages live and in post-processing, and what it is."""
+    smoothed = _metres(row.smoothed_rms_m)
+    worst = "" if row.smoothed_worst_m is None else f", worst {_metres(row.smoothed_worst_m)}"
+    if row.forward_end_rms_m is None:
+        return smoothed, f"in post-processing, RMS of {row.count}{worst}"
+    live_worst = "" if row.forward_end_worst_m is None else f", worst {_metres(row.forward_end_worst_m)}"
+    remark = f"at its end, RMS of {row.count}{live_worst}; in post-processing {smoothed} RMS of {row.count}{worst}"
+    return f"{_metres(row.forward_end_rms_m)} live", remark
+
+
+def _metres(value: float) -> str:
+    return number_with_unit(significant(value, 2), "m")
 
 
 def _outage_told(answer: BestTrajectory) -> OutageRow | None:

@@ -159,6 +159,8 @@ def outage_rows(outages: Outages, factor: float, height: float) -> tuple[OutageR
                 float(length_s * of.sum()),
                 float(np.sqrt(np.mean(outages.down_m[of] ** 2))),
                 float(np.mean(outages.down_ratio[of] <= height)),
+                float(np.max(outages.error_m[of])),
+                float(np.max(outages.forward_end_m[of])),
             )
         )
     return tuple(rows)

@@ -317,7 +317,7 @@ def _turned(turn: FloatArray, measured: FloatArray, evidence: MountingEvidence, 
     if evidence.off_square_deg > settings.square_within_deg:
         words = "{} the case at roll {:.0f}, pitch {:.0f}, yaw {:.0f} deg".format(seen, *measured)
         return Mounting("found", from_angles(measured), words, evidence)
-    words = f"{seen} {axes_told(turn)}, {evidence.off_square_deg:.1f} deg off"
+    words = f"{seen} {axes_told(turn)}; the case stands {evidence.off_square_deg:.1f} deg off these axes"
     return Mounting("found", turn, words, evidence)
 
 

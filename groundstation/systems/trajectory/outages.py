@@ -101,7 +101,7 @@ def _of_length(estimate: Estimate, length_s: float) -> list[tuple[float, ...]]:
         windows = windows[[_is_fit(estimate, start, end) for start, end in windows]] if len(windows) else windows
         if len(windows):
             done = without(estimate, windows)
-            rows += [_row(estimate.result, done, start, end) for start, end in windows]
+            rows += [_row(estimate.result, done, start, end, length_s) for start, end in windows]
     return rows
 
 
@@ -134,7 +134,7 @@ def without(estimate: Estimate, windows: FloatArray) -> Pass:
     return run_pass(problem.samples, plan, problem.noise(estimate.model), estimate.gate, base.begun, known=base.linear)
 
 
-def _row(full: Pass, done: Pass, start_s: float, end_s: float) -> tuple[float, ...]:
+def _row(full: Pass, done: Pass, start_s: float, end_s: float, length_s: float) -> tuple[float, ...]:
     times = full.plan.epoch_s
     inside: Int64Array = np.flatnonzero((times >= start_s) & (times <= end_s))
     error = done.x[inside, :NAVIGATION] - full.x[inside, :NAVIGATION]
@@ -150,7 +150,7 @@ def _row(full: Pass, done: Pass, start_s: float, end_s: float) -> tuple[float, .
     forward = done.solved.before[last, :2] - full.x[last, :2]
     return (
         start_s,
-        end_s - start_s,
+        length_s,  # end_s - start_s is another number by rounding
         float(size[worst]),
         float(np.sqrt(max(a + b, 1e-12))),
         float(np.sqrt(max(squared, 0.0) / CHI2_95_OF_2)),

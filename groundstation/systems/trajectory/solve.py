@@ -12,7 +12,7 @@ from groundstation.results.gates import Gate, judged_gate
 from groundstation.systems.known import Known
 from groundstation.systems.trajectory import checks, figures, fix_residuals, judge, tell
 from groundstation.systems.trajectory.aids_input import Aids, aids_of
-from groundstation.systems.trajectory.answer import BestTrajectory, TrajectoryState, UnitMounting
+from groundstation.systems.trajectory.answer import BestTrajectory, TrajectoryState
 from groundstation.systems.trajectory.checks_answer import HeadingHypothesis, InnovationRow, RaisedSigma
 from groundstation.systems.trajectory.estimate import Estimate
 from groundstation.systems.trajectory.gather import gather
@@ -184,6 +184,7 @@ def _answered(
     separation, separation_figure = figures.separation_of(forward, smoothed)
     compared = _onboard(smoothed, flight)
     other = _other_heading(smoothed, hypotheses) if state == "ambiguous" else None
+    parameters = tell.parameter_rows(main)
     answer = BestTrajectory(
         state=state,
         reasons=reasons,
@@ -194,12 +195,12 @@ def _answered(
         vehicle=vehicle,
         segments=figures.segments_of(smoothed),
         moving_s=moving_s(gathered.gnss, smoothed.time_s[0], smoothed.time_s[-1], settings.moving_mps),
-        mounting=_told(mounting),
+        mounting=tell.mounting_told(mounting, parameters),
         accuracy=figures.accuracy_of(smoothed),
         gates=gates,
         raised=raised,
         noise=tell.noise_rows(main),
-        parameters=tell.parameter_rows(main),
+        parameters=parameters,
         innovations=innovations,
         held_out=fix_residuals.held_out_rows(residuals[place]),
         own_track=own,
@@ -349,14 +350,6 @@ def _state(
 
 def _limit(gate: Gate) -> str:
     return " to ".join(f"{one:g}" for one in np.atleast_1d(gate.limit))
-
-
-def _told(mounting: Mounting) -> UnitMounting:
-    from groundstation.systems.trajectory.axis_turns import angles_of
-
-    roll, pitch, yaw = (float(one) for one in angles_of(mounting.body_from_case))
-    source = "case" if mounting.source == "refused" else mounting.source
-    return UnitMounting(source, mounting.words, roll, pitch, yaw)
 
 
 def _onboard(smoothed: TrackOfStates, flight: "Flight") -> tuple[ComparedFilter, ...]:

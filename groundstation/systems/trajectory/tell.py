@@ -1,13 +1,26 @@
 """Rows and arrays of the answer from the estimates of its segments."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import MPS2_PER_G
-from groundstation.systems.trajectory.answer import ARM, LATENCY, VELOCITY_LAG, NoiseRow, TrajectoryParameter
+from groundstation.systems.trajectory.answer import (
+    ARM,
+    LATENCY,
+    TRAVEL,
+    VELOCITY_LAG,
+    NoiseRow,
+    TrajectoryParameter,
+    UnitMounting,
+)
 from groundstation.systems.trajectory.arrays import TrajectoryBiases, TrajectoryOutages
+from groundstation.systems.trajectory.axis_turns import angles_of, with_travel_forward
 from groundstation.systems.trajectory.estimate import Estimate
 from groundstation.systems.trajectory.figures import rows_shown
 from groundstation.systems.trajectory.model import DEG, Model
+from groundstation.systems.trajectory.mounting import Mounting
 from groundstation.systems.trajectory.outages import Outages
 from groundstation.systems.trajectory.states import (
     BA,
@@ -97,9 +110,26 @@ def parameter_rows(estimate: Estimate) -> tuple[TrajectoryParameter, ...]:
     put(LAT, LATENCY, "latency", "s", 1.0, estimate.problem.latency_s)
     put(LAG, VELOCITY_LAG, "latency", "s", 1.0, estimate.problem.lag_s)
     put(WHL, "scale of the speed of the wheels", "wheels", "%", 0.01)
-    put(MNT, "travel in the unit, yaw", "mounting", "deg", DEG)
-    put(MNT + 1, "travel in the unit, pitch", "mounting", "deg", DEG)
+    for i, name in enumerate(TRAVEL):
+        put(MNT + i, name, "mounting", "deg", DEG)
     return tuple(rows)
+
+
+def mounting_told(mounting: Mounting, parameters: tuple[TrajectoryParameter, ...]) -> UnitMounting:
+    """Return the mounting.
+
+    It has the angles to state where the travel shows the unit turned in the vehicle.
+    """
+    roll, pitch, yaw = (float(one) for one in angles_of(mounting.body_from_case))
+    source = "case" if mounting.source == "refused" else mounting.source
+    told = UnitMounting(source, mounting.words, roll, pitch, yaw)
+    travel = [one for name in TRAVEL for one in parameters if one.name == name and one.is_observable]
+    if source != "found" or len(travel) < 2 or all(abs(one.value) <= NORMAL_95 * one.sigma for one in travel):
+        return told
+    turn = with_travel_forward(mounting.body_from_case, travel[0].value, travel[1].value)
+    off_deg = float(np.degrees(np.arccos(np.prod([np.cos(np.radians(one.value)) for one in travel]))))
+    first, second, third = (round(float(one), 1) % 360.0 for one in angles_of(turn))  # without signs: to be copied
+    return replace(told, off_deg=off_deg, to_state_deg=(first, second, third))
 
 
 def biases_of(estimates: tuple[Estimate, ...]) -> TrajectoryBiases:

@@ -1,7 +1,7 @@
 """Words for the best trajectory: state, accuracy, errors of the on-board filter."""
 
 from groundstation.base.words import places_of, span_text, with_half
-from groundstation.systems.trajectory.answer import BestTrajectory
+from groundstation.systems.trajectory.answer import TRAVEL, BestTrajectory
 from groundstation.systems.trajectory.onboard_answer import OnboardError, WrongSpan
 from groundstation.systems.trajectory.quantity_answer import Quantity
 
@@ -36,6 +36,33 @@ def accuracy_words(answer: BestTrajectory) -> str:
         if row is not None and not (quantity == "heading" and answer.state == "ambiguous"):
             told.append(f"{name} to {rounded(row.median_within95)} {row.unit}")
     return f"{', '.join(told)} (95 %)"
+
+
+def axes_words(answer: BestTrajectory) -> str:
+    """Return whose attitude it is, where it is not that of the vehicle; empty else."""
+    mounting = answer.mounting
+    if mounting.source == "case":
+        why = mounting.words.removeprefix("attitude is that of the case").removeprefix(": ")
+        return f"heading, roll and pitch are those of the unit's case{': ' * bool(why)}{why}"
+    if mounting.off_deg is None or mounting.to_state_deg is None:
+        return ""
+    yaw, pitch = (answer.parameter(name) for name in TRAVEL)
+    seen = "" if yaw is None or pitch is None else f" (yaw {yaw.value:.1f}, pitch {pitch.value:.1f} deg)"
+    return (
+        f"heading, roll and pitch are those of the unit: it travels {mounting.off_deg:.1f} deg off its forward axis"
+        f"{seen}; for those of the vehicle state {stated_words(mounting.to_state_deg)} in the aircraft file"
+    )
+
+
+def stated_words(angles_deg: tuple[float, float, float]) -> str:
+    """Return angles as a line of the aircraft file.
+
+    Examples
+    --------
+    >>> stated_words((180.0, 7.15, -174.84))
+    'imu_mounting_deg = [180.0, 7.2, -174.8]'
+    """
+    return f"imu_mounting_deg = [{', '.join(f'{one:.1f}' for one in angles_deg)}]"
 
 
 def opening_error(answer: BestTrajectory) -> tuple[OnboardError, WrongSpan] | None:

@@ -14,6 +14,7 @@ from groundstation.pipeline.one_flight.analyse import known_of, run_analyses, se
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import sentence
 from groundstation.pipeline.one_flight.join import _metadata
+from groundstation.pipeline.one_flight.line import verdict_first
 from groundstation.pipeline.verbs.acceptance import accept
 from groundstation.pipeline.verbs.usable import usability_of_flight
 from groundstation.results.answer import by_analysis
@@ -83,7 +84,10 @@ def test_a_unit_that_is_off_stands_first_in_the_line_of_the_flight() -> None:
     with_it = replace(results, answers={**results.answers, **by_analysis(answer)})
     before, after = sentence(results), sentence(with_it)
     assert before.startswith("accept: heading error")
-    assert after == f"{answer.sentence}; {before}" and front(with_it, systems().chapters).subject == "Several INS"
+    assert (
+        after == f"{verdict_first('Off', answer.sentence)}; {before}"
+        and front(with_it, systems().chapters).subject == "Several INS"
+    )
     agree = replace(with_it, answers={**with_it.answers, UNITS.name: replace(answer, verdict="one_of")})
     assert sentence(agree).startswith("accept: heading error")
 

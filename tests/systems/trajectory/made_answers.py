@@ -81,7 +81,17 @@ def accepted(of: TrackOfStates | None = None, *, heading_error_deg: float = 2.1,
         ),
         own_track=AgainstOwnTrack(3120, 0.18, 0.10),
         outages=tuple(
-            OutageRow(length, count, smoothed, forward, 0.95, 0.8, length * count)
+            OutageRow(
+                length,
+                count,
+                smoothed,
+                forward,
+                0.95,
+                0.8,
+                length * count,
+                smoothed_worst_m=2.0 * smoothed,
+                forward_end_worst_m=3.0 * forward,
+            )
             for length, count, smoothed, forward in zip(
                 LENGTHS, (20, 20, 18, 11), (0.4, 0.79, 1.25, 3.1), (1.1, 6.3, 20.4, 65.6), strict=True
             )
