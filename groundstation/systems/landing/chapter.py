@@ -3,7 +3,7 @@
 How each was flown, where it touched down, and what shows accuracy.
 """
 
-from groundstation.base.units import DOTS_PER_FULL_SCALE
+from groundstation.base.units import DOTS_PER_FULL_SCALE, M_PER_FOOT
 from groundstation.chapters.chapter import Remedies
 from groundstation.chapters.gates import setting_facts
 from groundstation.chapters.parts import (
@@ -31,8 +31,10 @@ from groundstation.chapters.wording import (
     sentence,
     significant,
     typeset,
+    unit_sign,
 )
 from groundstation.results.flight import FlightResults
+from groundstation.results.gates import Gate
 from groundstation.systems.landing.answer import (
     GLIDE_SLOPE_DOT,
     Approach,
@@ -110,18 +112,38 @@ def _claim(answer: LandingResult) -> Claim | None:
 
 def _why(one: Approach) -> str:
     """Return the verdict from each check height down, with what it rests on."""
-    return " ".join(f"From {number(at.height_m, 0, 'm')}: {at.verdict}{_rests_on(at)}." for at in one.stabilised)
+    left: dict[str, list[str]] = {}  # where the limits were left, and the check heights where they were kept
+    told = []
+    for at in one.stabilised:
+        if at.verdict == NOT_STABILISED and at.lost is not None and not at.lost.is_from_the_start:
+            left.setdefault(f"{_in_feet_too(at.lost.height_m)}{_rests_on(at)}", []).append(_in_feet_too(at.height_m))
+        else:
+            told.append(f"From {_in_feet_too(at.height_m)}: {at.verdict}{_rests_on(at)}.")
+    told += [f"Within the limits at {' and '.join(kept_at)}, left at {where}." for where, kept_at in left.items()]
+    return " ".join(told)
+
+
+def _in_feet_too(height_m: float) -> str:
+    """Return a height in metres, and in feet as crews speak of it."""
+    return f"{number(height_m, 0, 'm')} ({number(height_m / M_PER_FOOT, 0, 'ft')})"
 
 
 def _rests_on(at: StabilisedAt) -> str:
     """Return the criteria that failed, how many were judged, or why none was."""
-    failed = [criterion.title for criterion in at.gates if criterion.state == "failed"]
+    failed = [_failed(criterion) for criterion in at.gates if criterion.state == "failed"]
     judged = sum(criterion.state != "not_measured" for criterion in at.gates)
     if failed:
         return f" ({', '.join(failed)})"
     if not judged:
         return f" ({typeset(at.reason) or 'no criterion is in the log'})"
     return f" ({judged} of {len(at.gates)} criteria judged)" if judged < len(at.gates) else ""
+
+
+def _failed(criterion: Gate) -> str:
+    """Return a criterion that failed with its worst value: ``glide path deviation, worst 1.4 dot``."""
+    if criterion.value is None or not criterion.unit:
+        return criterion.title
+    return f"{criterion.title}, worst {number(criterion.value, 1, unit_sign(criterion.unit))}"
 
 
 def _figures(one: Approach) -> tuple[tuple[str, str, str], ...]:

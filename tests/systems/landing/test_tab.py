@@ -12,7 +12,7 @@ from groundstation.results.answer import by_analysis
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.gates import GateState
 from groundstation.simulation.approach import load_approach, simulate_approach
-from groundstation.systems.landing.answer import LandingResult, StabilisedAt
+from groundstation.systems.landing.answer import LandingResult, StabilisedAt, StabilityLost
 from groundstation.systems.landing.chapter import landing
 from groundstation.systems.landing.stabilised import decide
 from tests.recording_contents import Contents
@@ -69,16 +69,22 @@ def test_a_verdict_says_what_it_rests_on(with_site: FlightResults) -> None:
     empty = tuple(replace(one, state="not_measured") for one in high.gates)
     said = claimed(with_site, high=replace(high, gates=empty, verdict=decide(empty)), low=partly)
     assert said == (
-        "From 305 m: not measured (no criterion is in the log). From 152 m: stabilised (2 of 7 criteria judged)."
+        "From 305 m (1000 ft): not measured (no criterion is in the log). "
+        "From 152 m (500 ft): stabilised (2 of 7 criteria judged)."
     )
     reason = "the straight final begins at 200 m"
-    failed = tuple(replace(one, state="failed" if one.name == "bank" else one.state) for one in gates)
+    failed = tuple(replace(one, state="failed", value=9.3) if one.name == "bank" else one for one in gates)
+    not_stabilised = replace(low, gates=failed, verdict=decide(failed))
     said = claimed(
         with_site,
         high=StabilisedAt(high.height_m, "not measured", None, (), reason),
-        low=replace(low, gates=failed, verdict=decide(failed)),
+        low=replace(not_stabilised, lost=StabilityLost(152.4, 1000.0, "bank", is_from_the_start=True)),
     )
-    assert said == f"From 305 m: not measured ({reason}). From 152 m: not stabilised (bank)."
+    first = f"From 305 m (1000 ft): not measured ({reason}). "
+    assert said == first + "From 152 m (500 ft): not stabilised (bank, worst 9.3°)."
+    left = replace(not_stabilised, lost=StabilityLost(83.8, 1010.0, "bank", is_from_the_start=False))
+    said = claimed(with_site, high=StabilisedAt(high.height_m, "not measured", None, (), reason), low=left)
+    assert said == first + "Within the limits at 152 m (500 ft), left at 84 m (275 ft) (bank, worst 9.3°)."
 
 
 def test_limits_on_the_page_are_those_of_the_settings(with_site: FlightResults) -> None:
