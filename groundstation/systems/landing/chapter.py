@@ -140,7 +140,7 @@ def _rests_on(at: StabilisedAt) -> str:
 
 
 def _failed(criterion: Gate) -> str:
-    """Return a criterion that failed with its worst value: ``glide path deviation, worst 1.4 dot``."""
+    """Return a criterion that failed: ``glide path deviation, worst 1.4 dots``."""
     if criterion.value is None or not criterion.unit:
         return criterion.title
     return f"{criterion.title}, worst {number(criterion.value, 1, unit_sign(criterion.unit))}"
