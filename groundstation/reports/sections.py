@@ -1,6 +1,6 @@
 """Chapters of the flight report, in its order, with their figures drawn."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
@@ -13,10 +13,10 @@ from groundstation.chapters.chapter import Chapters
 from groundstation.chapters.findings import findings
 from groundstation.chapters.next_steps import next_steps
 from groundstation.chapters.overview import overview
-from groundstation.chapters.parts import Facts, Note, Part, Section, kept
+from groundstation.chapters.parts import Facts, Grid, Note, Part, Section, kept
 from groundstation.chapters.provenance import provenance, sources
 from groundstation.chapters.quality import quality
-from groundstation.reports.drawing import drawn_by
+from groundstation.reports.drawing import Drawing, drawn_by
 from groundstation.results.files import SavedFlight
 from groundstation.results.flight import FlightResults
 from groundstation.systems.system import Systems
@@ -121,13 +121,22 @@ def _as_set(part: Part, configuration: Mapping[str, Any]) -> Part | None:
 def on_a_page(section: Section, saved: SavedFlight, systems: Systems) -> Section:
     """Return a section as a report shows it.
 
-    Its figures are drawn; of the files beside the report it names those that exist.
+    Its figures are drawn; of the files beside the report, and of the tables behind it, it names those that exist.
     """
     drawn = drawn_by(systems.plots, section, saved.results)
+    tables = frozenset(saved.results.figure_names)
     parts = (
-        _of_files_there(part, saved.folder) if isinstance(part, Note) and part.files else part for part in drawn.parts
+        _of_files_there(part, saved.folder) if isinstance(part, Note) and part.files else with_tables_of(tables, part)
+        for part in drawn.parts
     )
     return replace(drawn, parts=tuple(part for part in parts if part is not None))
+
+
+def with_tables_of(known: Container[str], part: Part) -> Part:
+    """Return a part that names, of the tables behind it, those that the flight has."""
+    if not isinstance(part, Grid | Drawing):
+        return part
+    return replace(part, numbers=tuple(name for name in part.numbers if name in known))
 
 
 def _of_files_there(note: Note, folder: Path) -> Note | None:

@@ -119,9 +119,13 @@ def test_names_inside_the_page_are_unique_and_links_lead_somewhere(full: str) ->
     assert set(re.findall(r"url\(#([^)]*)\)", full)) <= set(names)
 
 
+def links_of(page: Page) -> list[str]:
+    """Links to other files."""
+    return [value for tag, name, value in page.attributes if tag == "a" and name == "href" and value[:1] != "#"]
+
+
 def test_links_to_tables_exist(tmp_path: Path) -> None:
-    page = Page(report(tmp_path, example(heading_result())))
-    links = [value for tag, name, value in page.attributes if tag == "a" and name == "href" and value[:1] != "#"]
+    links = links_of(Page(report(tmp_path, example(heading_result()))))
     assert "tables/heading_samples.csv" in links and "manifest.json" in links
     assert all((tmp_path / link).is_file() for link in links)
 
@@ -304,6 +308,7 @@ def test_each_figure_alone_makes_a_report(tmp_path: Path) -> None:
     for item in results.figures:
         page = Page(report(tmp_path, replace(results, figures=(item,))))
         assert page.tags.count("figure") <= 4, item.name
+        assert [link for link in links_of(page) if not (tmp_path / link).is_file()] == [], item.name
 
 
 def test_bare_results_give_a_report(tmp_path: Path) -> None:
