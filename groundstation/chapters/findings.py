@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from groundstation.base.findings import Finding
+from groundstation.base.words import counted
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Part, Section
 from groundstation.chapters.wording import number
 from groundstation.results.flight import FlightResults
@@ -26,9 +27,28 @@ def findings(results: FlightResults) -> Section:
     grave = [item for item in found if item.severity != "info"]
     remarks = [item for item in found if item.severity == "info"]
     parts: list[Part] = [_table(grave) if grave else Note("No warnings.", "good")]
-    if remarks:
-        parts.append(Note(f"{'One remark' if len(remarks) == 1 else f'{len(remarks)} remarks'} in the appendix."))
+    where = _where(results.findings, len(_one_of_each(remarks)))
+    if where:
+        parts.append(Note(where))
     return Section("findings", TITLE, LEAD, parts, appendix=(_table(_one_of_each(remarks)),) if remarks else ())
+
+
+def _where(every: Sequence[Finding], lines: int) -> str:
+    """Return where the findings stand that this chapter does not list.
+
+    With those listed they are all that the front counts.
+    """
+    above = [item for item in every if item.code.endswith(TOLD_ABOVE)]
+    remarks = sum(item.severity == "info" for item in every)
+    remarks_above = sum(item.severity == "info" for item in above)
+    grave_above, below = len(above) - remarks_above, remarks - remarks_above
+    told = [f"{counted(grave_above, 'warning')} at the top of the report"] if grave_above else []
+    if remarks_above:
+        told.append(f"{counted(remarks_above, 'remark')} at the top of the report")
+    if below:
+        shared = "" if below == lines else f" ({counted(lines, 'line')}, one for each kind)"
+        told.append(f"{counted(below, 'remark')} in the appendix{shared}")
+    return f"{'; '.join(told)}." if told else ""
 
 
 def _one_of_each(remarks: Sequence[Finding]) -> list[Finding]:

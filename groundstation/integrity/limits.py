@@ -49,6 +49,7 @@ class RhythmLimits:
     unexplained: float = required_number(0.0, 1.0)
     burst_coverage: float = required_number(0.0, 1.0)
     burst_rows: int = required_number(0)
+    burst_s: float = required_number(0.0)
 
 
 @dataclass(frozen=True)

@@ -65,9 +65,10 @@ class Rhythm:
 def rhythm_of(topic: str, time_ns: Int64Array, thresholds: Thresholds) -> Rhythm:
     """The rhythm of a topic, from its corrected times in order, shape (n,).
 
-    A topic that is written when something happens has none: by its name, by too few or too uneven steps, or by bursts
-    with pauses between. A topic whose usual step leaves a good part of the time without an explanation (records that
-    come in pairs, a wavering timer) has gaps, if it is canonical, by its mean step, but no nominal rate.
+    A topic that is written when something happens has none: by its name, by too few or too uneven steps, or by bursts:
+    all at one moment (definitions, units, lists) or with pauses between. A topic whose usual step leaves a good part of
+    the time without an explanation (records that come in pairs, a wavering timer) has gaps, if it is canonical, by its
+    mean step, but no nominal rate.
     """
     limits, steps = thresholds.rhythm, np.diff(time_ns)
     ahead = steps[steps > 0]
@@ -96,7 +97,10 @@ def _is_sporadic(topic: str, rhythm: Rhythm, long_ns: float, limits: RhythmLimit
         return False
     if rhythm.ahead < limits.fewest_steps or long_ns > limits.uneven * rhythm.period_ns:
         return True
-    gaps = int(np.count_nonzero(rhythm.steps_ns > _longest_ns(rhythm.period_ns, rhythm.limits)))
+    is_gap = rhythm.steps_ns > _longest_ns(rhythm.period_ns, rhythm.limits)
+    gaps = int(np.count_nonzero(is_gap))
+    if int(rhythm.steps_ns[~is_gap].sum()) < limits.burst_s * NS_PER_S * (gaps + 1):
+        return True  # lists and definitions, written at one moment: the step in a burst is no period
     is_thin = rhythm.coverage < limits.burst_coverage
     return is_thin and gaps > 0 and (rhythm.ahead + 1) / (gaps + 1) < limits.burst_rows
 

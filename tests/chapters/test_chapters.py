@@ -364,6 +364,16 @@ def test_what_the_front_tells_is_not_told_again_among_the_findings() -> None:
     assert [row[1] for row in grid(section, "Findings").rows] == ["data.gaps"]
 
 
+def test_the_findings_counted_on_the_front_are_accounted_for() -> None:
+    raw = [Finding("info", "time.duplicates", f"raw.t{n}: repeats", f"raw.t{n}") for n in range(5)]
+    above = [Finding("info", f"{one}.not_assessable", "no INS") for one in ("heading", "inertial")]
+    others = [Finding("info", "gnss.held", "steps of 1.1 cm"), Finding("warn", "heading.reject", "rejected")]
+    results = example(None, findings=(*raw, *above, *others))
+    assert dict(front(results).pairs)["Findings"] == "1 warn · 8 info"
+    where = "1 warning at the top of the report; 2 remarks at the top of the report"
+    assert Note(f"{where}; 6 remarks in the appendix (2 lines, one for each kind).") in findings(results).parts
+
+
 def test_next_steps_are_at_most_three_lines_by_what_they_are_for() -> None:
     failed = (
         Gate("taxi_seconds", "", 12.0, 20.0, "s", "failed", sense="at_least"),

@@ -148,3 +148,38 @@ def test_topics_of_different_records_share_one_clock() -> None:
     found = survey([LogHeader("t"), ins, RecordBatch("gnss", gnss.record_index, gnss.device_time_ns, {})])
     assert found.ledger["ins"].first_ns == 40 * NS_PER_S and found.ledger["gnss"].first_ns == 60 * NS_PER_S
     assert found.ledger["ins"].backward_steps == 1 and found.ledger["gnss"].backward_steps == 0
+
+
+def log_of(**others: list[float]) -> list[Item]:
+    """Make a log of 100 s with an INS at 10 Hz and other topics at the times given, recorded in order of time."""
+    topics = {"ins": np.arange(0.0, 100.0, 0.1).tolist(), **{f"raw.{name}": times for name, times in others.items()}}
+    place = np.argsort(np.argsort(np.concatenate(list(topics.values())), kind="stable"))
+    items: list[Item] = [LogHeader("t")]
+    at = 0
+    for topic, times_s in topics.items():
+        index = place[at : at + len(times_s)].astype(np.int64)
+        items.append(RecordBatch(topic, index, batch(topic, times_s).device_time_ns, {}))
+        at += len(times_s)
+    return items
+
+
+@pytest.mark.parametrize(
+    "times_s",
+    [
+        [0.5 + 1e-5 * row for row in range(15)],  # MULT: 15 units within 0.2 ms
+        [0.5 + 1e-5 * row for row in range(70)] + [55.0 + 1e-5 * row for row in range(70)],  # FMTU: two bursts
+        [0.5 + 0.01 * row for row in range(300)],  # FILE: files written in the first 3.5 s
+    ],
+)
+def test_lists_written_once_have_no_rate_and_lose_nothing(times_s: list[float]) -> None:
+    found = survey(log_of(MULT=times_s)).ledger
+    assert not found.damages and not len(found["raw.MULT"].gaps)
+    assert not [one for one in ledger_findings(found) if one.code in ("data.breaks_off", "data.gaps")]
+
+
+def test_a_burst_is_no_rate_but_a_stream_that_stops_is_told() -> None:
+    found = survey(log_of(MULT=[0.5 + 1e-5 * row for row in range(15)], TECS=[0.1 * row for row in range(500)])).ledger
+    assert found["raw.MULT"].nominal_rate_hz is None and found["raw.MULT"].coverage is None
+    assert found["raw.TECS"].nominal_rate_hz == pytest.approx(10.0)
+    (ends,) = found.damages
+    assert (ends.topic, ends.kind, ends.count, ends.loses_data) == ("raw.TECS", "breaks_off", 500, False)
