@@ -229,6 +229,8 @@ class InertialResult(Answer, KindOfIns, AzimuthByTurns, BestTrack, ErrorsAlongTh
     radial_error_rate_fit_nmiph : float or None
         The time-position fit of the same error, the figure of the acceptance: slope through the origin by least
         squares over all epochs since navigation began. None where the median is.
+    largest_radial_error_m, largest_radial_error_at_s : float or None
+        Largest radial position error, and its flight time.
     navigation_start : NavigationStart or None
         When navigation began; None of an INS that GNSS corrects.
     radial_error_first_m, radial_error_last_m : float or None
@@ -274,6 +276,7 @@ class InertialResult(Answer, KindOfIns, AzimuthByTurns, BestTrack, ErrorsAlongTh
     radial_error_rate_fit_nmiph: float | None = None
     velocity_error_rms_mps: float | None = None
     largest_radial_error_m: float | None = None
+    largest_radial_error_at_s: float | None = None
     navigation_start: NavigationStart | None = None
     radial_error_first_m: float | None = None
     radial_error_last_m: float | None = None

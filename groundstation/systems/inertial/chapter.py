@@ -30,7 +30,14 @@ from groundstation.systems.inertial.answer import (
     StateEstimate,
     is_left_alone,
 )
-from groundstation.systems.inertial.claim_chapter import drift_of, growth, inertial_claim, is_start_unknown, lead_of
+from groundstation.systems.inertial.claim_chapter import (
+    drift_of,
+    growth,
+    inertial_claim,
+    is_start_unknown,
+    largest_of,
+    lead_of,
+)
 
 NOISE = "noise."  # what begins the names of those settings that the class gives
 PLACES = {"m": 1, "mps": 3, "arcsec": 1, "dph": 4, "dphph": 4}
@@ -164,7 +171,7 @@ def _figures_of_merit(answer: InertialResult) -> Facts:
         ),
         *_start(answer),
         ("Velocity error, RMS", number(answer.velocity_error_rms_mps, 3, "m/s"), "both channels together"),
-        ("Largest radial error", number(answer.largest_radial_error_m, 0, "m"), "against GNSS"),
+        ("Largest radial error", *largest_of(answer)),
         ("Kind", (answer.kind or ABSENT).replace("_", "-"), typeset(answer.kind_reason)),
         ("INS class", answer.ins_class or ABSENT, f"noise parameters: {origin}" if origin else ""),
         (

@@ -5,9 +5,10 @@ How fast the INS drifts, and how far a forecast can go.
 
 from collections.abc import Iterator
 
+from groundstation.base.units import M_PER_NAUTICAL_MILE
 from groundstation.chapters.chapter import Advice
 from groundstation.chapters.parts import Claim, Mark, Rank, Tone
-from groundstation.chapters.wording import is_number, number
+from groundstation.chapters.wording import ABSENT, clock, is_number, number
 from groundstation.results.flight import FlightResults
 from groundstation.systems.inertial.answer import InertialResult
 from groundstation.systems.inertial.forecast_answer import ForecastResult, SkillRow
@@ -25,7 +26,9 @@ def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -
     rate, measure = drift_of(answer)
     drift = number(rate, 2, "nmi/h")
     if is_number(rate):
-        headline, remark = f"Unaided INS, drifts {drift}", measure
+        is_stated = answer.navigation_start is not None and answer.navigation_start.basis == "stated"
+        headline = f"Unaided INS, drifts {drift}"
+        remark = f"{measure}; start of navigation as you stated it" if is_stated else measure
     elif is_start_unknown(answer):
         headline = f"INS error {growth(answer)}"
         remark = "no rate: nothing shows when navigation began"
@@ -34,7 +37,7 @@ def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -
     found = (
         ("INS drift", drift, measure),
         ("Velocity error", number(answer.velocity_error_rms_mps, 2, "m/s"), "RMS"),
-        ("Largest position error", number(answer.largest_radial_error_m, 0, "m"), "against GNSS"),
+        ("Largest position error", *largest_of(answer)),
     )
     tone: Tone = "warn" if is_doubtful else "good"
     return Claim(
@@ -46,6 +49,16 @@ def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -
         sentences=(quality,) if quality else (),
         figures=tuple(figure for figure in found if figure[1] != "—"),
     )
+
+
+def largest_of(answer: InertialResult) -> tuple[str, str]:
+    """Return the largest position error, and against what and when, in nautical miles too."""
+    value = answer.largest_radial_error_m
+    if not is_number(value):
+        return ABSENT, ""
+    at = answer.largest_radial_error_at_s
+    miles = number(value / M_PER_NAUTICAL_MILE, 2, "nmi")
+    return number(value, 0, "m"), f"{miles}, against GNSS" + (f", at {clock(at)}" if is_number(at) else "")
 
 
 def lead_of(lead: str, topic: str, results: FlightResults) -> str:

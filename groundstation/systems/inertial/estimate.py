@@ -200,6 +200,7 @@ def _result(
         radial_error_rate_fit_nmiph=rate_fit,
         velocity_error_rms_mps=float(np.sqrt(np.mean(np.sum(speed**2, axis=1)))) if len(speed) else None,
         largest_radial_error_m=float(np.nanmax(radial)) if len(ends) else None,
+        largest_radial_error_at_s=float(epochs.time_s[np.nanargmax(radial)]) if len(ends) else None,
         navigation_start=start,
         radial_error_first_m=float(radial[ends[0]]) if len(ends) else None,
         radial_error_last_m=float(radial[ends[1]]) if len(ends) else None,
