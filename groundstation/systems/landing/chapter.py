@@ -78,7 +78,7 @@ def landing(results: FlightResults) -> Section | None:
     told = answer.approaches[:MOST_TOLD]
     parts: list[Part | None] = [_overview(answer)]
     for one in told:
-        parts += _approach(one, answer)
+        parts += _approach(one, answer, results.start_utc_ns)
     if len(answer.approaches) > MOST_TOLD:
         parts.append(Note(f"Approaches {MOST_TOLD + 1} to {len(answer.approaches)} are only in the table above."))
     parts += [_left_out(answer), *(Note(sentence(remark)) for remark in answer.remarks)]
@@ -220,7 +220,7 @@ def _row(one: Approach) -> tuple[Cell, ...]:
     )
 
 
-def _approach(one: Approach, answer: LandingResult) -> list[Part | None]:
+def _approach(one: Approach, answer: LandingResult, start_utc_ns: int | None) -> list[Part | None]:
     of = str(one.number)
     return [
         Note(f"Approach {one.number}, {_name(one)}. {_told(one)}"),
@@ -229,7 +229,7 @@ def _approach(one: Approach, answer: LandingResult) -> list[Part | None]:
         Figure("landing.runway", of) if one.runway.is_surveyed and one.runway.length_m else None,
         runway_facts(one),
         *criteria_parts(one, answer.settings.get("gate_floor_m")),
-        *touchdown_parts(one),
+        *touchdown_parts(one, start_utc_ns),
         *(_error(one, error) for error in one.position_errors),
         *(along_facts(one, error) for error in one.along_errors),
         *(_height(one, error) for error in one.height_errors),

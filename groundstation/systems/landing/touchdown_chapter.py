@@ -1,6 +1,8 @@
 """Touchdown of an approach as a page tells it: time by its witnesses, place, manner."""
 
 from groundstation.base.quantiles import NORMAL_95
+from groundstation.base.timescales import utc_ns_to_iso
+from groundstation.base.units import NS_PER_S
 from groundstation.chapters.parts import Cell, Facts, Grid, Head, Mark, Part, Tone
 from groundstation.chapters.wording import ABSENT, clock, number, sentence, typeset
 from groundstation.systems.landing.answer import Approach
@@ -23,12 +25,12 @@ STATES: dict[str, tuple[Tone, str]] = {
 }
 
 
-def touchdown_parts(one: Approach) -> list[Part | None]:
+def touchdown_parts(one: Approach, start_utc_ns: int | None) -> list[Part | None]:
     """Return facts and witnesses of the touchdown of an approach, or why none is claimed."""
     down = one.touchdown
     if down is None:
         return [_not_claimed(one)]
-    return [_facts(one, down), _witnesses(one, down)]
+    return [_facts(one, down, start_utc_ns), _witnesses(one, down)]
 
 
 def _not_claimed(one: Approach) -> Facts | None:
@@ -37,10 +39,11 @@ def _not_claimed(one: Approach) -> Facts | None:
     return Facts(f"Approach {one.number}: touchdown", (("Touchdown", "not claimed", typeset(one.touchdown_reason)),))
 
 
-def _facts(one: Approach, down: Touchdown) -> Facts:
+def _facts(one: Approach, down: Touchdown, start_utc_ns: int | None) -> Facts:
     by = f"{number(down.time_s, 1, 's')} of flight" + (f", by {typeset(down.found_by)}" if down.found_by else "")
     pairs = [
         ("Time", f"{clock(down.time_s)} {_interval(down)}", f"95 %; {by}"),
+        *([] if start_utc_ns is None else [("UTC", _utc(start_utc_ns, down.time_s), "")]),
         ("Place", f"{number(down.latitude_deg, 5, '°')}, {number(down.longitude_deg, 5, '°')}", _along(down)),
         ("Beyond the threshold", number(down.past_threshold_m, 0, "m"), _beyond(one, down)),
         ("Ground speed", number(down.ground_speed_mps, 1, "m/s"), ""),
@@ -55,6 +58,11 @@ def _facts(one: Approach, down: Touchdown) -> Facts:
         *_by_states(down.by_states),
     ]
     return Facts(f"Approach {one.number}: touchdown", tuple(pairs))
+
+
+def _utc(start_utc_ns: int, time_s: float) -> str:
+    """Return the date and time of day of a flight second, to a tenth."""
+    return utc_ns_to_iso(start_utc_ns + round(time_s * NS_PER_S), 1).replace("T", " ").removesuffix("Z")
 
 
 def _interval(down: Touchdown) -> str:

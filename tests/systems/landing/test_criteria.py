@@ -1,6 +1,7 @@
 """Criteria of an approach against simulated truth: configuration, wind, speed, threshold, touchdown; bad input."""
 
 from dataclasses import replace
+from datetime import datetime, timedelta
 from functools import cache
 
 import numpy as np
@@ -171,8 +172,10 @@ def test_the_touchdown_tells_its_distance_as_recorded_and_without_the_error_of_t
     rows = tuple(replace(row, value=100.0) if row.name == "touchdown" else row for row in one.criteria)
 
     def told(some: Approach) -> str:
-        facts = touchdown_parts(some)[0]
-        assert isinstance(facts, Facts)
+        facts = touchdown_parts(some, 1_315_842_233_000_000_000)[0]
+        assert isinstance(facts, Facts) and some.touchdown is not None
+        utc = datetime(2011, 9, 12, 15, 43, 53) + timedelta(seconds=round(some.touchdown.time_s, 1))
+        assert {pair[0]: pair[1] for pair in facts.pairs}["UTC"] == utc.isoformat(" ", "milliseconds")[:-2]
         return next(str(pair[2]) for pair in facts.pairs if pair[0] == "Beyond the threshold")
 
     assert told(replace(one, criteria=())) == "as recorded"
