@@ -10,6 +10,7 @@ since the start (milliseconds, 4 bytes) and the length of the log behind it (4 o
 
 import struct
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,13 +112,27 @@ def tag_of(content: bytes) -> TimeTag | None:
     return None
 
 
+def beside(source: Source) -> Path:
+    """Return the path at which RTKLIB puts the time tag of a log."""
+    return source.path.with_name(source.path.name + ".tag")
+
+
+def has_tag(source: Source) -> bool:
+    """Tell whether a time tag of RTKLIB stands beside a log."""
+    path = beside(source)
+    try:
+        return path.is_file() and tag_of(path.read_bytes()) is not None
+    except OSError:
+        return False
+
+
 def clock_by_tag(source: Source, dialect: Dialect, layout: TableLayout) -> tuple[TaggedClock | None, list[Remark]]:
     """Return the clock of a table's rows by the time tag beside it, and remarks.
 
     None where there is no tag, or one of another log. A log whose line ends were made shorter since it was written is
     understood: the bytes are counted as they were.
     """
-    path = source.path.with_name(source.path.name + ".tag")
+    path = beside(source)
     tag = tag_of(path.read_bytes()) if path.is_file() else None
     if tag is None:
         why = "is no time tag of RTKLIB" if path.is_file() else "is not there"

@@ -6,8 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from groundstation.base.errors import UnreadableLogError
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
+from groundstation.pipeline.verbs.profiles import new_profile
 from groundstation.readers import profile_file as profiles
 from groundstation.readers import registry
 from groundstation.readers.rtklib_tag import tag_of
@@ -75,6 +77,21 @@ def test_rows_get_utc_by_the_writes_of_the_host(tmp_path: Path, wide: bool, ends
     assert np.abs(found - truth_ns(len(found))).max() < 1_000_000  # a fifteenth of the timer's step
     assert read.times("imu")[0] == FIRST_MS * 1_000_000
     assert "scatter by 4." in read.remarks["time_tag"].text and "50 ppm slow" in read.remarks["time_tag"].text
+
+
+def test_a_draft_takes_the_tag_beside_its_table(tmp_path: Path) -> None:
+    log, _settings = written(tmp_path)
+    draft = new_profile(log, ("ax", "ms"))
+    assert "rtklib_tag = true" in draft.text and "UTC by imu.csv.tag" in draft.time.why
+    (tmp_path / "imu.csv.tag").write_bytes(b"no tag of RTKLIB")
+    assert "rtklib_tag" not in new_profile(log, ("ax", "ms")).text
+
+
+def test_a_table_without_names_asks_for_them(tmp_path: Path) -> None:
+    table = tmp_path / "a.csv"
+    table.write_text("".join(f"{k % 3},{(7 * k) % 5}\n" for k in range(40)), encoding="utf-8")
+    with pytest.raises(UnreadableLogError, match=r"--names ax,ay,az,time_ms"):
+        new_profile(table)
 
 
 def test_a_host_that_hung_once_changes_nothing(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ question mark in the draft.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from groundstation.readers.drafts.sample import sample_of
 from groundstation.readers.drafts.time_guess import TimeGuess
 from groundstation.readers.drafts.times import time_of
 from groundstation.readers.drafts.written import written
+from groundstation.readers.rtklib_tag import beside, has_tag
 from groundstation.readers.source import Source
 
 
@@ -51,7 +52,11 @@ class Draft:
     def doubts(self) -> tuple[str, ...]:
         """Lines that tell what the user has to look at."""
         told = [f"time: {self.time.doubt}"] if self.time.doubt else []
-        return (*told, *(f"{one.name}: {one.doubt}" for one in self.columns if one.doubt))
+        names: dict[str, list[str]] = {}  # columns of one doubt, which is told once
+        for one in self.columns:
+            if one.doubt:
+                names.setdefault(one.doubt, []).append(one.name)
+        return (*told, *(f"{', '.join(of)}: {doubt}" for doubt, of in names.items()))
 
 
 @np.errstate(all="ignore")  # a table may hold any number
@@ -64,7 +69,7 @@ def draft_of(source: Source, names: Sequence[str] = ()) -> Draft:
         When the file is no table, or has no time that can be read; the cause is named.
     """
     sample = sample_of(source, names)
-    time = time_of(sample)
+    time = _by_tag(source, time_of(sample))
     guesses = Guesses(sample, time).columns()
     return Draft(
         written(sample, time, guesses),
@@ -74,6 +79,14 @@ def draft_of(source: Source, names: Sequence[str] = ()) -> Draft:
         tuple(sample.names[at] for at in time.columns),
         guesses,
     )
+
+
+def _by_tag(source: Source, time: TimeGuess) -> TimeGuess:
+    """Return a time in seconds of a device with UTC by the time tag of RTKLIB beside it."""
+    if time.is_absolute or 'kind = "seconds"' not in time.lines or not has_tag(source):
+        return time
+    why = f"{time.why}; UTC by {beside(source).name}, the time tag of RTKLIB"
+    return replace(time, lines=(*time.lines, "rtklib_tag = true"), why=why, is_absolute=True)
 
 
 def facts_of(draft: Draft) -> Mapping[str, object]:

@@ -82,7 +82,9 @@ def _no_time(sample: TableSample) -> tuple[str, str, str]:
     return (
         f"no column that is a time among {names}",
         "numbers that rise, or dates",
-        "add a column with the time of each row",
+        "add a column with the time of each row"
+        if sample.header is not None or sample.are_given
+        else "name the columns, as in --names ax,ay,az,time_ms",
     )
 
 
