@@ -266,3 +266,19 @@ def test_a_receiver_that_falls_silent_is_a_loss_for_every_verb_unless_limits_all
     codes += [groundstation("run", log, "-o", tmp_path / "out", "--only", "results")[0], checked(mcap)[0]]
     assert codes == [3, 3, 3, 3, 3]
     assert [checked(one, "--thresholds", allowed)[0] for one in (log, mcap)] == [0, 0]
+
+
+def test_a_profile_serves_the_logs_that_it_describes(tmp_path: Path) -> None:
+    """Of several logs the others are read as they are known, as `run --together` does."""
+    table, profile = tmp_path / "imu.csv", tmp_path / "imu.toml"
+    table.write_text("ms,wz\n" + "".join(f"{20 * k},{k % 5}\n" for k in range(100)), encoding="utf-8")
+    profile.write_text(
+        'name = "imu"\n[recognise]\ncolumns = ["ms", "wz"]\n[time]\nkind = "seconds"\ncolumn = "ms"\nunit = "ms"\n'
+        '[columns]\nwz = { field = "imu.rate_z_dps", unit = "dps" }\n',
+        encoding="utf-8",
+    )
+    flat = SAMPLES / "taxi-short.csv"
+    code, out, _ = groundstation("check", "--json", table, flat, "--profile", profile)
+    found = json.loads(out)
+    assert code == 0 and [one["state"] for one in found] == ["done", "done"], out[:300]
+    assert groundstation("check", flat, "--profile", profile)[0] == 1

@@ -106,7 +106,7 @@ def join_files(
         if as_log(path).is_dir():
             raise UsageError(str(path), "a folder", "the logs of one flight by name", "--together takes files")
         try:
-            logs.append(_opened(path, configuration))
+            logs.append(open_of_several(path, configuration))
         except UnreadableLogError as error:
             unclaimed.append((path, error))
     if not logs and unclaimed:
@@ -119,7 +119,7 @@ def join_files(
     return join_logs(logs, target, configuration.thresholds, settings=settings, left_out=left_out)
 
 
-def _opened(path: Path, configuration: Configuration) -> Log:
+def open_of_several(path: Path, configuration: Configuration) -> Log:
     """Open one of several logs: by the profile, else as a reader knows it."""
     try:
         return open_log(path, configuration.profile_path, configuration.icds)

@@ -149,7 +149,8 @@ def check_here(
     flights: dict[int, Flight] = {}
     for number, path in enumerate(paths):
         listen(Event("stage", path.name, "reading"))
-        checked, flight = _check_or_reason(path, configuration, fail_on, with_flight=bool(purpose))
+        is_alone = len(paths) == 1
+        checked, flight = _check_or_reason(path, configuration, fail_on, with_flight=bool(purpose), is_alone=is_alone)
         if flight is not None and is_session:
             flights[number] = flight
         elif flight is not None:
@@ -195,10 +196,15 @@ def _for_session(
 
 
 def _check_or_reason(
-    path: Path, configuration: Configuration, fail_on: str, *, with_flight: bool
+    path: Path, configuration: Configuration, fail_on: str, *, with_flight: bool, is_alone: bool
 ) -> tuple[CheckedLog, "Flight | None"]:
     try:
-        log = open_log(path, configuration.profile_path, configuration.icds)
+        if is_alone or configuration.profile_path is None:
+            log = open_log(path, configuration.profile_path, configuration.icds)
+        else:
+            from groundstation.pipeline.one_flight.join import open_of_several
+
+            log = open_of_several(path, configuration)
         return checked_with_flight(log, configuration.thresholds, fail_on, with_flight=with_flight)
     except Exception as error:
         reason, trace = reason_of(path.name, error)
