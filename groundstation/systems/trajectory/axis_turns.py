@@ -80,7 +80,7 @@ def with_travel_forward(body_from_case: FloatArray, yaw_deg: float, pitch_deg: f
     --------
     >>> case_aft_up = from_angles((180.0, 0.0, 180.0))
     >>> angles_of(with_travel_forward(case_aft_up, 5.0, 7.0)).round(2).tolist()
-    [180.0, 6.97, -175.04]
+    [179.39, 6.97, 174.96]
     """
     turned: FloatArray = from_angles((0.0, pitch_deg, yaw_deg)).T @ body_from_case
     return turned
