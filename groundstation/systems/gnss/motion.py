@@ -105,10 +105,8 @@ def _lasting_mps(beyond_m: FloatArray, step_s: FloatArray, usable: BoolArray) ->
     for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
         passed_s = np.concatenate([[0.0], np.cumsum(step_s[start:end])])
         moved_m = np.vstack([np.zeros((1, 2)), np.cumsum(beyond_m[start:end], axis=0)])
-        count = int(passed_s[-1] // LASTING_S)
-        if count:
-            rows = np.searchsorted(passed_s, LASTING_S * np.arange(count + 1))
-            rows = np.unique(np.minimum(rows, len(passed_s) - 1))
+        rows = np.flatnonzero(np.diff(passed_s // LASTING_S, prepend=-1.0) > 0.0)  # first of every ten seconds
+        if len(rows) > 1:
             means.append(np.diff(moved_m[rows], axis=0) / np.diff(passed_s[rows])[:, None])
     if not means:
         return None
