@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.gaps import Gaps
 from groundstation.base.ledger import Ledger
+from groundstation.base.nearest import nearest_rows
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import EVENT_SEPARATOR, topics_of_kind
 from groundstation.results.arrays.flight import GapRows, GnssLanes, LedgerRows, Overview, PhaseSpans, StateLanes
@@ -180,9 +181,7 @@ def _nearest(times_ns: Int64Array, values: NDArray[np.float64], wanted_ns: Int64
         return np.full(len(wanted_ns), np.nan)
     if not known.all():
         times_ns, values = times_ns[known], values[known]
-    right = np.clip(np.searchsorted(times_ns, wanted_ns), 0, len(times_ns) - 1)
-    left = np.maximum(right - 1, 0)
-    nearest = np.where(np.abs(wanted_ns - times_ns[left]) < np.abs(times_ns[right] - wanted_ns), left, right)
+    nearest = nearest_rows(times_ns, wanted_ns, takes_later=True)
     return np.where(np.abs(times_ns[nearest] - wanted_ns) <= NEAR_NS, values[nearest], np.nan)
 
 

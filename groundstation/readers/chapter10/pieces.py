@@ -6,6 +6,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from groundstation.base.nearest import nearest_rows
 from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
 from groundstation.readers.chapter10 import scan
 from groundstation.readers.icd.model import FloatArray
@@ -95,17 +96,10 @@ def _nearest(one: WordSamples, other: WordSamples) -> tuple[Int64Array, Int64Arr
     """
     if not len(one.index) or not len(other.index):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    to_other, to_one = (_closest(a.time_ns, b.time_ns) for a, b in ((one, other), (other, one)))
+    to_other, to_one = (nearest_rows(b.time_ns, a.time_ns, takes_later=True) for a, b in ((one, other), (other, one)))
     rows = np.arange(len(one.index))
     is_mutual = (to_one[to_other] == rows) & (np.abs(other.time_ns[to_other] - one.time_ns) <= APART_NS)
     return rows[is_mutual], to_other[is_mutual]
-
-
-def _closest(times: Int64Array, among: Int64Array) -> Int64Array:
-    """Return the place of the nearest of ``among``, which increase, to each time."""
-    after = np.minimum(np.searchsorted(among, times), len(among) - 1)
-    before = np.maximum(after - 1, 0)
-    return np.where(times - among[before] < among[after] - times, before, after)
 
 
 def _with_fine(piece: WordSamples, fine: WordSamples) -> WordSamples:

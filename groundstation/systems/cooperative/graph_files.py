@@ -18,6 +18,7 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.ecef import ecef_from_n, geodetic_deg_m
 from groundstation.base.errors import NotAssessableError, UsageError
+from groundstation.base.nearest import nearest_rows
 from groundstation.base.units import NS_PER_S
 from groundstation.results.arrays.session import SessionPoints
 from groundstation.results.flight import FlightResults
@@ -184,8 +185,10 @@ def _ranges(graph: _Graph, links: CooperativeLinks, numbers: Mapping[str, int]) 
             if not len(mine):
                 continue
             at_s = links.time_s[mine]
-            here = _nearest(graph.times[receiver], at_s)
-            there = _nearest(graph.times[source], at_s) if source in graph.tracks else np.zeros(len(mine), dtype=int)
+            here = nearest_rows(graph.times[receiver], at_s)
+            there = (
+                nearest_rows(graph.times[source], at_s) if source in graph.tracks else np.zeros(len(mine), dtype=int)
+            )
             then = np.linalg.norm(graph.place_at(receiver, at_s) - graph.place_at(source, at_s), axis=1)
             other = graph.tracks[source][there] if source in graph.tracks else graph.points[source]
             now = np.linalg.norm(graph.tracks[receiver][here] - other, axis=1)
@@ -197,10 +200,3 @@ def _ranges(graph: _Graph, links: CooperativeLinks, numbers: Mapping[str, int]) 
                 strict=True,
             ):
                 yield f"EDGE_RANGE {numbers[receiver] + a} {numbers[source] + b} {read:.4f} {1.0 / sigma**2:.6g}\n"
-
-
-def _nearest(times: FloatArray, at_s: FloatArray) -> "np.ndarray":
-    after = np.clip(np.searchsorted(times, at_s), 1, max(len(times) - 1, 1))
-    before = after - 1
-    after = np.minimum(after, len(times) - 1)
-    return np.where(at_s - times[before] <= times[after] - at_s, before, after)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.base.geodesy import SEMI_MAJOR_M, curvature_radii_m, on_earth
+from groundstation.base.nearest import nearest_rows
 from groundstation.base.records import BoolArray, Column
 from groundstation.base.signals import topics_of_kind
 from groundstation.systems.gnss.answer import WITHOUT_FIX
@@ -162,10 +163,7 @@ def _with_hdop(flight: Flight, table: Table) -> tuple[Table, str]:
         if not known.size:
             continue
         time_ns = flight[topic].time_ns[known]
-        place = np.searchsorted(time_ns, table.time_ns)
-        before, behind = np.maximum(place - 1, 0), np.minimum(place, len(time_ns) - 1)
-        is_before = np.abs(table.time_ns - time_ns[before]) <= np.abs(time_ns[behind] - table.time_ns)
-        nearest = np.where(is_before, before, behind)
+        nearest = nearest_rows(time_ns, table.time_ns)
         near = np.abs(time_ns[nearest] - table.time_ns) <= 0.5 * np.median(np.diff(table.time_ns))
         if near.any():
             hdop = np.where(near, values[known][nearest], np.nan)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.nearest import nearest_rows
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.tables.table import Flight, Table
@@ -119,12 +120,8 @@ def nearest(time_ns: Int64Array, other_ns: Int64Array, largest_gap_s: float) -> 
     """
     if not len(other_ns):
         return np.zeros(len(time_ns), dtype=np.intp), np.zeros(len(time_ns), dtype=bool)
-    after = np.clip(np.searchsorted(other_ns, time_ns, side="left"), 0, len(other_ns) - 1)
-    before = np.maximum(after - 1, 0)
-    to_after, to_before = np.abs(other_ns[after] - time_ns), np.abs(other_ns[before] - time_ns)
-    place = np.where(to_after < to_before, after, before)
-    gap = np.minimum(to_after, to_before) / NS_PER_S
-    return place, np.asarray(gap <= largest_gap_s)
+    place = nearest_rows(other_ns, time_ns)
+    return place, np.asarray(np.abs(other_ns[place] - time_ns) / NS_PER_S <= largest_gap_s)
 
 
 def bit(value: FloatArray, number: int) -> FloatArray:

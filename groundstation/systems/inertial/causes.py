@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.nearest import nearest_rows
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import Int64Array
 from groundstation.methods.ins_noise import RADPS_PER_DPH
@@ -298,9 +299,7 @@ def error_windows(run: ChannelsRun, position_m: FloatArray, start_s: float | Non
 def _nearest(time_s: FloatArray, known: Int64Array, at_s: FloatArray) -> Int64Array:
     """Return the known rows nearest to some times, -1 where none is within :data:`NEAR_S`."""
     times = time_s[known]
-    after = np.clip(np.searchsorted(times, at_s), 0, len(times) - 1)
-    before = np.maximum(after - 1, 0)
-    place = np.where(np.abs(times[before] - at_s) < np.abs(times[after] - at_s), before, after)
+    place = nearest_rows(times, at_s, takes_later=True)
     return np.asarray(np.where(np.abs(times[place] - at_s) <= NEAR_S, known[place], -1), dtype=np.int64)
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.nearest import nearest_rows
 from groundstation.base.records import Column
 from groundstation.base.signals import topics_of_kind
 from groundstation.systems.trajectory.onboard_offsets import euler_deg
@@ -111,11 +112,7 @@ def _angles_deg(q: FloatArray) -> FloatArray:
 
 def _nearest(table: Table, motion: Table) -> dict[str, Column]:
     """Return the motion of a lane at the nearest times of its attitude."""
-    last = len(motion) - 1
-    after = np.searchsorted(motion.time_ns, table.time_ns).clip(min(1, last), last)
-    before = np.maximum(after - 1, 0)
-    is_before = np.abs(table.time_ns - motion.time_ns[before]) < np.abs(motion.time_ns[after] - table.time_ns)
-    row = np.where(is_before, before, after)
+    row = nearest_rows(motion.time_ns, table.time_ns, takes_later=True)
     near = np.abs(motion.time_ns[row] - table.time_ns) <= NEAR_NS
     return {name: Column(motion.values(source)[row], near) for name, source in PX4_MOTION.items()}
 

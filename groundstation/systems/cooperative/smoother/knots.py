@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.nearest import nearest_rows
 from groundstation.base.records import Int64Array
 from groundstation.systems.cooperative.aircraft import Aircraft
 from groundstation.systems.cooperative.aircraft_motion import dynamics
@@ -50,7 +51,7 @@ class Knots:
 
     def nearest(self, at_s: FloatArray) -> Int64Array:
         """Return the knot nearest to each time."""
-        return _nearest(self.time_s, at_s)
+        return nearest_rows(self.time_s, at_s, takes_later=True)
 
 
 def knots_of(prepared: Prepared, settings: CooperativeSettings) -> Knots:
@@ -62,7 +63,7 @@ def knots_of(prepared: Prepared, settings: CooperativeSettings) -> Knots:
     spans = np.array([(vehicle.first_s, vehicle.last_s) for vehicle in prepared.vehicles])
     wanted = np.sort(np.concatenate([events.time_s, output_s]))
     time_s = _clustered(wanted, longest_step_s(prepared), float(spans[:, 0].min()))
-    knot = _nearest(time_s, events.time_s)
+    knot = nearest_rows(time_s, events.time_s, takes_later=True)
     order = np.argsort(knot, kind="stable")
     return Knots(
         time_s,
@@ -71,7 +72,7 @@ def knots_of(prepared: Prepared, settings: CooperativeSettings) -> Knots:
         knot[order],
         output_s,
         output_vehicle,
-        _nearest(time_s, output_s),
+        nearest_rows(time_s, output_s, takes_later=True),
     )
 
 
@@ -121,10 +122,3 @@ def _clustered(wanted_s: FloatArray, step_s: float, first_s: float) -> FloatArra
             knots.append(middle)
         at = last + 1
     return np.array(knots)
-
-
-def _nearest(time_s: FloatArray, at_s: FloatArray) -> Int64Array:
-    after = np.clip(np.searchsorted(time_s, at_s), 1, max(len(time_s) - 1, 1))
-    if len(time_s) == 1:
-        return np.zeros(len(at_s), dtype=np.int64)
-    return np.asarray(after - (at_s - time_s[after - 1] < time_s[after] - at_s), dtype=np.int64)

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.nearest import nearest_rows
 from groundstation.base.records import Int64Array, frozen
 from groundstation.systems.cooperative.events import Prepared, prepare
 from groundstation.systems.cooperative.loop_types import POINT
@@ -98,7 +99,10 @@ def information_of(prepared: Prepared, solved: SmoothedProblem, settings: Cooper
     places = np.array([[layout.of(who).start, layout.of(who).start + 1] for who in range(len(prepared.vehicles))])
     matrix = weighted.T @ left[:, :-1]
     covariance = np.array(
-        [track.horizontal_m2[_nearest(track.time_s, solved.knots.time_s)] for track in solved.smoothed.run.tracks]
+        [
+            track.horizontal_m2[nearest_rows(track.time_s, solved.knots.time_s, takes_later=True)]
+            for track in solved.smoothed.run.tracks
+        ]
     )
     score = weighted.T @ left[:, -1]
     at_stations = np.flatnonzero((source >= 0) & ~rows.is_bearing)
@@ -167,13 +171,3 @@ def honest_square(scale: float) -> float:
     u = np.linspace(-12.0, 12.0, 4801)
     density = np.exp(-0.5 * u**2)
     return float((density * cauchy(u, scale) * u**2).sum() / density.sum()) * honest_factor(scale)
-
-
-def _nearest(time_s: FloatArray, at_s: FloatArray) -> np.ndarray:
-    after = np.clip(np.searchsorted(time_s, at_s), 1, max(len(time_s) - 1, 1))
-    before = after - 1
-    return np.where(
-        at_s - time_s[before] < time_s[np.minimum(after, len(time_s) - 1)] - at_s,
-        before,
-        np.minimum(after, len(time_s) - 1),
-    )
