@@ -5,7 +5,6 @@ See docs/decisions/012.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
 
 import numpy as np
 
@@ -39,7 +38,6 @@ from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.skill import QUANTILES, claimed_sigma
 from groundstation.systems.inertial.start_covariance import lead_growth
 from groundstation.systems.inertial.study.cases import FilterCase, differences_of, epochs_of, model_of
-from groundstation.systems.study import mapped
 
 LEAD_STEP_S, LEADS = 600.0, 12
 STEP_S, VARIANCE_STEP_S = 10.0, 60.0
@@ -233,19 +231,6 @@ def fly_bank(case: FilterCase, run: int, settings: InertialSettings) -> BankOutc
     flown = run_filter(epochs, model_of(case, batch, 0), case.noise, gate=case.gate)
     truth = DifferenceEpochs.plain(epochs.time_s, batch.position_error_m[0], batch.velocity_error_mps[0])
     return judge_bank(differences_of(batch, 0, epochs), flown, truth, settings)
-
-
-def fly_banks(cases: Sequence[FilterCase], runs: int, settings: InertialSettings) -> dict[str, list[BankOutcome]]:
-    """Fly so many flights of every case that stands for real ones."""
-    chosen = [case for case in cases if case.is_held_out]
-    jobs = [(case, run, settings) for case in chosen for run in range(runs)]
-    with mapped(len(jobs)) as each:
-        found = iter(each(_fly_bank, jobs))
-        return {case.name: list(islice(found, runs)) for case in chosen}
-
-
-def _fly_bank(job: tuple[FilterCase, int, InertialSettings]) -> BankOutcome:
-    return fly_bank(*job)
 
 
 def bank_table(outcomes: Mapping[str, Sequence[BankOutcome]]) -> FigureData:

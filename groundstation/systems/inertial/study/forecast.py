@@ -7,10 +7,10 @@ from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.study import tables
 from groundstation.systems.inertial.study.cases import study_cases
 from groundstation.systems.inertial.study.consistency import RUNS, consistency_table
-from groundstation.systems.inertial.study.coupled_bank import bank_table, fly_banks
-from groundstation.systems.inertial.study.outages import fly_outages, outage_table
+from groundstation.systems.inertial.study.coupled_bank import bank_table, fly_bank
+from groundstation.systems.inertial.study.outages import fly_with_outages, outage_table
 from groundstation.systems.inertial.study.page import page
-from groundstation.systems.inertial.study.runs import COUPLED, Progress, run_cases
+from groundstation.systems.inertial.study.runs import COUPLED, Progress, fly_held_out, run_cases
 from groundstation.systems.study import StudyResult
 
 OUTAGE_RUNS = 30  # flights of a case with outages in the log
@@ -46,8 +46,8 @@ def study_forecast(runs: int = 200, seed: int = 71, progress: Progress | None = 
         tables.honesty_table(outcomes),
         tables.gate_table(outcomes),
         consistency_table(cases[0].seed, min(runs, RUNS)),
-        bank_table(fly_banks(cases, max(2, min(calibrated, BANK_RUNS)), settings)),
-        outage_table(fly_outages(cases, max(2, min(calibrated, OUTAGE_RUNS)), settings)),
+        bank_table(fly_held_out(cases, max(2, min(calibrated, BANK_RUNS)), settings, fly_bank)),
+        outage_table(fly_held_out(cases, max(2, min(calibrated, OUTAGE_RUNS)), settings, fly_with_outages)),
     )
     is_coupled = settings.model == "coupled" and settings.default_method == tables.REFERENCE
     shipped = COUPLED if is_coupled else settings.default_method

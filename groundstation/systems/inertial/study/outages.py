@@ -5,7 +5,6 @@ The smoother inside them, the forecasts through and after them, and their bands.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
 from zlib import crc32
 
 import numpy as np
@@ -25,7 +24,6 @@ from groundstation.systems.inertial.skill import QUANTILES, claimed_sigma
 from groundstation.systems.inertial.start_covariance import lead_growth
 from groundstation.systems.inertial.study.cases import NO_GATE, FilterCase, differences_of, epochs_of, model_of
 from groundstation.systems.inertial.study.runs import mean_known
-from groundstation.systems.study import mapped
 
 FIRST_S, LENGTHS_S, BETWEEN_S = 3600.0, (60.0, 3600.0), (900.0, 1800.0)
 AFTER_MIN = (10.0, 30.0, 60.0)
@@ -160,19 +158,6 @@ def _after(
     known = np.isfinite(error)
     count = known.sum(axis=(0, 2))
     return np.where(count > 0, (inside & known).sum(axis=(0, 2)) / np.maximum(count, 1), np.nan)
-
-
-def fly_outages(cases: Sequence[FilterCase], runs: int, settings: InertialSettings) -> dict[str, list[OutageOutcome]]:
-    """Fly so many flights of every case that stands for real ones, with outages in their logs."""
-    chosen = [case for case in cases if case.is_held_out]
-    jobs = [(case, run, settings) for case in chosen for run in range(runs)]
-    with mapped(len(jobs)) as each:
-        found = iter(each(_fly_with_outages, jobs))
-        return {case.name: list(islice(found, runs)) for case in chosen}
-
-
-def _fly_with_outages(job: tuple[FilterCase, int, InertialSettings]) -> OutageOutcome:
-    return fly_with_outages(*job)
 
 
 def outage_table(outcomes: Mapping[str, Sequence[OutageOutcome]]) -> FigureData:

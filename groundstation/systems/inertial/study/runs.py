@@ -5,6 +5,7 @@ A small outcome of each is kept.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from groundstation.systems.inertial.replay import plan_replay
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.skill import QUANTILES, WITH_SIGMA, Claimed, claimed_sigma
 from groundstation.systems.inertial.study.cases import FilterCase, differences_of, epochs_of, model_of
-from groundstation.systems.study import mapped
+from groundstation.systems.study import OutcomeT, mapped
 
 Progress = Callable[[str], None]
 
@@ -126,6 +127,27 @@ def run_cases(
             if progress:
                 progress(f"flight {flight.run} of {', '.join(case.name for case in flight.cases)}")
     return {name: tuple(several) for name, several in outcomes.items()}
+
+
+def fly_held_out(
+    cases: Sequence[FilterCase],
+    runs: int,
+    settings: InertialSettings,
+    fly_one: Callable[[FilterCase, int, InertialSettings], OutcomeT],
+) -> dict[str, list[OutcomeT]]:
+    """Fly so many flights of every case that stands for real ones, in the order of the runs."""
+    jobs = [(case, run, settings) for case in cases if case.is_held_out for run in range(runs)]
+    outcomes: dict[str, list[OutcomeT]] = {case.name: [] for case, _, _ in jobs}
+    with mapped(len(jobs)) as each:
+        for (case, _, _), outcome in zip(jobs, each(partial(_fly_job, fly_one), jobs), strict=True):
+            outcomes[case.name].append(outcome)
+    return outcomes
+
+
+def _fly_job(
+    fly_one: Callable[[FilterCase, int, InertialSettings], OutcomeT], job: tuple[FilterCase, int, InertialSettings]
+) -> OutcomeT:
+    return fly_one(*job)
 
 
 @dataclass(frozen=True)
