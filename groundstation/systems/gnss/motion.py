@@ -10,6 +10,7 @@ from groundstation.systems.gnss.answer import PositionJump, VelocityAgainstPosit
 from groundstation.systems.gnss.series import ReceiverRows
 from groundstation.systems.gnss.settings import GnssSettings
 from groundstation.systems.gnss.spells import known
+from groundstation.tables.motion import runs
 
 LEAST_STEPS = 10
 MOST_JUMPS = 20  # that the answer lists, the largest; all are counted
@@ -99,10 +100,8 @@ def _lasting_mps(beyond_m: FloatArray, step_s: FloatArray, usable: BoolArray) ->
     White noise of the position, ``s`` in each of two axes, leaves ``2 s / LASTING_S`` of it whatever the rate of fixes,
     where from fix to fix it is ``2 s`` times the rate.
     """
-    starts = np.flatnonzero(usable & ~np.append(False, usable[:-1]))
-    ends = np.flatnonzero(usable & ~np.append(usable[1:], False)) + 1
     means = []
-    for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
+    for start, end in runs(usable):
         passed_s = np.concatenate([[0.0], np.cumsum(step_s[start:end])])
         moved_m = np.vstack([np.zeros((1, 2)), np.cumsum(beyond_m[start:end], axis=0)])
         rows = np.flatnonzero(np.diff(passed_s // LASTING_S, prepend=-1.0) > 0.0)  # first of every ten seconds

@@ -15,6 +15,7 @@ from groundstation.systems.trajectory.imu_samples import SUBJECT, UnitSamples
 from groundstation.systems.trajectory.input_settings import InputSettings
 from groundstation.systems.trajectory.mounting_settings import MountingSettings
 from groundstation.systems.trajectory.short_spans import QUIET_MPS2, Steps
+from groundstation.tables.motion import runs
 
 LONG_S, LONG_SHARE = 10.0, 0.2  # of the log: stuck for so long needs less motion beside it
 SAME = 1e-6  # relative: increments and their intervals are logged in single precision
@@ -40,7 +41,7 @@ def without_stuck(samples: UnitSamples, topic: str, settings: InputSettings, not
     long_s = max(LONG_S, LONG_SHARE * float(np.ptp(samples.time_s)))
     for axis, name in enumerate(AXES):
         places, count = [], 0
-        for start, end in _runs(stays[axis]):
+        for start, end in runs(stays[axis]):
             length_s = samples.time_s[end] - samples.time_s[start]
             is_long = length_s >= long_s and changes[start:end].mean() > 0.5
             is_alone = _flicker(stays, axis, start, end)
@@ -77,12 +78,6 @@ def _stays(samples: UnitSamples, axis: int) -> BoolArray:
     return np.asarray(np.abs(np.diff(values)) <= SAME * np.abs(values[1:]))
 
 
-def _runs(chosen: BoolArray) -> list[tuple[int, int]]:
-    """Return the first place of each run, and the one behind its last."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], chosen, [False])).astype(np.int8)))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
-
-
 def _moves(rates: FloatArray) -> bool:
     """Tell whether a unit is turned or shaken by more than the resolution of a coarse one."""
     low, high = np.percentile(rates, (5.0, 95.0), axis=0)
@@ -102,10 +97,10 @@ def ends_of_range(samples: UnitSamples, notes: list[InputNote]) -> tuple[int, in
         most = float(values.max())
         if most < LEAST_END[axis // 3]:
             continue
-        runs = [(a, b) for a, b in _runs(values >= most * (1.0 - AT_END)) if b - a >= FEWEST_AT_END]
-        count = sum(b - a for a, b in runs)
+        at_end = [(a, b) for a, b in runs(values >= most * (1.0 - AT_END)) if b - a >= FEWEST_AT_END]
+        count = sum(b - a for a, b in at_end)
         if count:
-            first_s = float(samples.time_s[runs[0][0]])
+            first_s = float(samples.time_s[at_end[0][0]])
             text = (
                 f"{name} stays at {_shown(axis, most)} for {counted(count, 'sample')}, first at {clock_text(first_s)}"
             )
