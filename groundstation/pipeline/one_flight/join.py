@@ -25,7 +25,7 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.continued import in_recordings, with_strangers
 from groundstation.pipeline.one_flight.convert import Converted, census_of, convert_log, recounted
 from groundstation.pipeline.one_flight.flight import read_flight
-from groundstation.pipeline.one_flight.log import Log, as_log, open_log
+from groundstation.pipeline.one_flight.log import Log, as_log, open_one_of_several
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.store.info import StoreInfo
 from groundstation.systems import systems
@@ -106,7 +106,7 @@ def join_files(
         if as_log(path).is_dir():
             raise UsageError(str(path), "a folder", "the logs of one flight by name", "--together takes files")
         try:
-            logs.append(open_of_several(path, configuration))
+            logs.append(open_one_of_several(path, configuration.profile_path, configuration.icds))
         except UnreadableLogError as error:
             unclaimed.append((path, error))
     if not logs and unclaimed:
@@ -117,20 +117,6 @@ def join_files(
     settings = configuration.settings.of(_step().settings)
     left_out = [_left_out(path.name, error) for path, error in unclaimed if path not in used]
     return join_logs(logs, target, configuration.thresholds, settings=settings, left_out=left_out)
-
-
-def open_of_several(path: Path, configuration: Configuration) -> Log:
-    """Open one of several logs: by the profile, else as a reader knows it."""
-    try:
-        return open_log(path, configuration.profile_path, configuration.icds)
-    except UnreadableLogError:
-        if configuration.profile_path is None:
-            raise
-        try:
-            return open_log(path, None, configuration.icds)
-        except UnreadableLogError:
-            pass
-        raise
 
 
 def join_logs(

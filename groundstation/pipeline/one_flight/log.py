@@ -1,6 +1,7 @@
 """Log of any kind that a user names: a recorded log, or an MCAP from groundstation."""
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -167,6 +168,21 @@ def open_log(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()
     claim = identify(path, profile)
     size = sum(file.stat().st_size for file in _files_of(path))
     return Log(path, Source(log_name(path), digest_of(path), size, claim.title), False, profile, icds)
+
+
+def open_one_of_several(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()) -> Log:
+    """Open one of several logs: by the profile where it describes it, else as a reader knows it.
+
+    Raises as :func:`open_log`, of the profile.
+    """
+    try:
+        return open_log(path, profile, icds)
+    except UnreadableLogError:
+        if profile is None:
+            raise
+        with suppress(UnreadableLogError):
+            return open_log(path, None, icds)
+        raise
 
 
 def open_parts(paths: Sequence[Path], profile: Path | None = None, icds: tuple[str, ...] = ()) -> Log:

@@ -24,7 +24,7 @@ from groundstation.pipeline.one_flight.convert import (
     told_of_fields,
     why_nothing_is_placed,
 )
-from groundstation.pipeline.one_flight.log import Log, as_log, open_log
+from groundstation.pipeline.one_flight.log import Log, as_log, open_log, open_one_of_several
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.segments import PowerUpTold, segments_in, segments_of, told_of
@@ -199,12 +199,8 @@ def _check_or_reason(
     path: Path, configuration: Configuration, fail_on: str, *, with_flight: bool, is_alone: bool
 ) -> tuple[CheckedLog, "Flight | None"]:
     try:
-        if is_alone or configuration.profile_path is None:
-            log = open_log(path, configuration.profile_path, configuration.icds)
-        else:
-            from groundstation.pipeline.one_flight.join import open_of_several
-
-            log = open_of_several(path, configuration)
+        opened = open_log if is_alone else open_one_of_several
+        log = opened(path, configuration.profile_path, configuration.icds)
         return checked_with_flight(log, configuration.thresholds, fail_on, with_flight=with_flight)
     except Exception as error:
         reason, trace = reason_of(path.name, error)
