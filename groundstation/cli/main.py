@@ -2,15 +2,12 @@
 
 import io
 import sys
-from collections.abc import Sequence
-from copy import copy
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from typer.main import get_command_name
-from typer.models import CommandInfo
 
 from groundstation.base.errors import UsageError
 from groundstation.base.garbage import importing
@@ -55,8 +52,8 @@ from groundstation.cli.application import (
     tell_written,
     time_limit_s,
 )
+from groundstation.cli.asked_verb import application_for
 from groundstation.cli.completion import analyses
-from groundstation.cli.plain_words import PlainWords
 
 # the modules hold more verbs
 __all__ = [
@@ -174,9 +171,9 @@ def run(
     from groundstation.pipeline.one_flight.configuration import (
         applying,
         installed_as,
-        laid_out,
         load_configuration,
     )
+    from groundstation.pipeline.one_flight.layout import saved_layout
     from groundstation.pipeline.one_flight.progress import silent
 
     refuse_pdf_of_results(only, pdf=pdf)
@@ -185,7 +182,8 @@ def run(
     settings = installed_as(applying(settings, apply), installation)
     if layout is not None and only == "results":
         raise UsageError("--layout", "--only results", "recordings to lay out")
-    configuration = laid_out(judged_by(settings, reference or (), is_one_log=is_one_log), layout)
+    settings = judged_by(settings, reference or (), is_one_log=is_one_log)
+    configuration = replace(settings, layout=saved_layout(layout))
     if together and (dry_run or scheduler or stations is not None or timeout is not None or store or isolate):
         beside = "--dry-run, --scheduler, --stations, --timeout, --store or --isolate"
         raise UsageError("--together", beside, "--together without them")
@@ -428,27 +426,4 @@ def main(arguments: Any = None) -> None:
             spare_pandas()  # what Dask imports is Dask's affair
             if sys.argv[1] == "run":
                 import groundstation.pipeline.many_flights.runs.batch  # noqa: F401  # the most of what a run imports
-    _application_for(sys.argv[1:] if arguments is None else arguments)(arguments)
-
-
-def _application_for(words: Sequence[str]) -> typer.Typer:
-    """Return the application with only the verb that is asked for.
-
-    Typer makes the parameters of all verbs before it calls one.
-    """
-    asked = [verb for verb in app.registered_commands if [*words[:1]] == [_name_of(verb)]]
-    if not asked:
-        return app
-    alone = copy(app)
-    alone.registered_commands, alone.registered_groups = [_with_plain_words(verb) for verb in asked], []
-    return alone
-
-
-def _with_plain_words(verb: CommandInfo) -> CommandInfo:
-    plain = copy(verb)
-    plain.cls = PlainWords
-    return plain
-
-
-def _name_of(verb: CommandInfo) -> str:
-    return verb.name or get_command_name(verb.callback.__name__ if verb.callback else "")
+    application_for(sys.argv[1:] if arguments is None else arguments)(arguments)

@@ -3,6 +3,7 @@
 import importlib.util
 import struct
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,8 @@ from typer.testing import CliRunner
 
 from groundstation.base.errors import GroundstationError
 from groundstation.cli.main import app
-from groundstation.pipeline.one_flight.configuration import Configuration, laid_out
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.layout import saved_layout
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.resume import keys_of
@@ -132,10 +134,10 @@ def test_another_layout_is_another_run(layout: Path, tmp_path: Path) -> None:
     rrb.Blueprint(rrb.TextDocumentView(origin="/summary"), auto_views=False).save("groundstation a", str(other))
     source = open_log(SHORT).source
     plain = Configuration()
-    keys = [keys_of(source, laid_out(plain, path)) for path in (None, layout, other, layout)]
+    keys = [keys_of(source, replace(plain, layout=saved_layout(path))) for path in (None, layout, other, layout)]
     assert len({one.conversion for one in keys}) == 1, "the MCAP stays"
     assert keys[1] == keys[3] and len({one.analysis for one in keys}) == 3
-    assert laid_out(plain, layout).to_dict() == {"layout": "mine.rbl"}
+    assert replace(plain, layout=saved_layout(layout)).to_dict() == {"layout": "mine.rbl"}
 
 
 def test_view_opens_a_copy_with_it(

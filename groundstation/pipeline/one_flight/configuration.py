@@ -4,8 +4,6 @@ The user may leave out or force intervals. The analyses are imported when their 
 gives any: a log is converted without.
 """
 
-import hashlib
-import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -18,6 +16,7 @@ from groundstation.base.toml_settings import settings_from
 from groundstation.base.toml_text import toml_table, toml_text
 from groundstation.integrity.limits import Thresholds, thresholds_from
 from groundstation.pipeline.one_flight.isolation import Isolation
+from groundstation.pipeline.one_flight.layout import SavedLayout
 
 if TYPE_CHECKING:
     from groundstation.results.installations import Lesson
@@ -116,24 +115,6 @@ class References:
 
 
 NO_REFERENCES = References()
-
-
-@dataclass(frozen=True)
-class SavedLayout:
-    """Layout saved in the viewer, for recordings: name of its file, and packed content."""
-
-    name: str
-    packed: bytes = field(repr=False)
-
-    @property
-    def content(self) -> bytes:
-        """Content of its file."""
-        return zlib.decompress(self.packed)
-
-    @property
-    def sha256(self) -> str:
-        """Digest of the content."""
-        return hashlib.sha256(self.content).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -361,23 +342,6 @@ def installed_as(configuration: Configuration, installation: Path | None) -> Con
     from groundstation.results.installations import read_installations
 
     return replace(configuration, lessons=read_installations(installation).lessons)
-
-
-def laid_out(configuration: Configuration, layout: Path | None) -> Configuration:
-    """Return the configuration with a layout for the recordings of flights.
-
-    Unchanged without a file.
-
-    Raises
-    ------
-    UsageError
-        When it is no layout that this version's viewer saved.
-    """
-    if layout is None:
-        return configuration
-    from groundstation.viewer.saved_layout import read_layout
-
-    return replace(configuration, layout=SavedLayout(layout.name, zlib.compress(read_layout(layout))))
 
 
 def applying(configuration: Configuration, apply: str) -> Configuration:

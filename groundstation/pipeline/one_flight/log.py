@@ -171,7 +171,7 @@ def open_log(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()
 
 
 def open_one_of_several(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()) -> Log:
-    """Open one of several logs: by the profile where it describes it, else as a reader knows it.
+    """Open one of several logs, by the profile if it describes it, else as known.
 
     Raises as :func:`open_log`, of the profile.
     """

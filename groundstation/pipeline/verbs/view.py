@@ -9,8 +9,9 @@ from pathlib import Path
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.pipeline.many_flights.fleet.publishing import FLEET_RECORDING
 from groundstation.pipeline.many_flights.inputs import COMPARISON_RECORDING, file_in, is_remote
-from groundstation.pipeline.one_flight.configuration import Configuration, SavedLayout, laid_out
+from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job, run_flight
+from groundstation.pipeline.one_flight.layout import SavedLayout, saved_layout
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.verbs.recordings import is_of_rerun, sound
 from groundstation.results.files import load_manifest
@@ -60,18 +61,19 @@ def look_at(
         raise UsageError(what, "no such file or folder")
     if is_address and layout is not None:
         raise UsageError("--layout", "the address of a catalog", "a recording, flight folder, MCAP or log")
-    configuration = laid_out(Configuration(profile=str(profile) if profile else None), layout)
+    saved = saved_layout(layout)
     if not web:
         require_display(os.environ)  # before anything is computed
     if is_address:
         code = open_viewer(what, web=web, host=host, port=port)
     elif path.is_dir() or path.suffix == ".rrd":
         recording = sound(_recording(path))
-        with _laid_out(recording, configuration.layout) as shown:
+        with _laid_out(recording, saved) as shown:
             code = open_viewer(shown, web=web, host=host, port=port, links=recording.parent, say=say)
     else:
         with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
             say(f"computing {path.name} ...")
+            configuration = Configuration(profile=str(profile) if profile else None, layout=saved)
             outcome = run_flight(Job(path, Path(folder), configuration, power_up=power_up))
             if outcome.state == "failed":
                 where, _, found = outcome.text.partition(": ")
