@@ -9,6 +9,7 @@ from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatc
 from groundstation.tables.table import Table
 
 MORE = 8  # a column that is full gets room for an eighth more
+MOST_AHEAD = 64  # times the rows that came: what a damaged count asks for beyond is not believed
 
 
 class GrowingTable:
@@ -39,7 +40,7 @@ class GrowingTable:
     def add(self, batch: RecordBatch) -> None:
         """Take the rows of a batch; it has ``time_ns``."""
         start, end = self._rows, self._rows + len(batch)
-        room = max(self._expected, end)
+        room = max(min(self._expected, MOST_AHEAD * end), end)
         for name in batch.columns:
             if name not in self._columns:
                 self._columns[name] = _Growing()
