@@ -3,9 +3,9 @@
 import ast
 import re
 from collections.abc import Iterator
-from pathlib import Path
 
-PACKAGE = Path(__file__).parents[1] / "groundstation"
+from tests.architecture_picture import PACKAGE, statements
+
 LONGEST = 88
 # Words that begin a riddle: a question, a place, a condition or a pronoun in place of the thing.
 NOT_FIRST = re.compile(
@@ -27,7 +27,7 @@ def test_a_docstring_begins_with_a_verb_or_a_noun_on_a_line_of_its_own() -> None
 
 
 def _docstrings(tree: ast.Module) -> Iterator[tuple[int, str]]:
-    for node in ast.walk(tree):
+    for node in statements(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             doc = ast.get_docstring(node)
             if doc is not None:

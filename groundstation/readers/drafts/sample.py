@@ -88,6 +88,11 @@ class TableSample:
         return uses_decimal_comma(rows, self.delimiter)
 
     @cached_property
+    def is_of_ships(self) -> bool:
+        """Tell whether a column names a ship (MMSI): its numbers have signs for not known."""
+        return any(name.lower() == "mmsi" for name in self.names)
+
+    @cached_property
     def columns(self) -> tuple[tuple[str, ...], ...]:
         """Cells of each column, of all pieces."""
         return tuple(zip(*(row for block in self.blocks for row in block), strict=True))
@@ -141,7 +146,7 @@ class TableSample:
         """Return the numbers by which ships say that a direction, a place or a speed is not known."""
         meaning = self.meanings[at]
         number = _OF_SHIPS.get(meaning.field, np.nan) if meaning is not None else np.nan
-        is_sure = number > 360.0 or number in (91.0, 181.0) or any(name.lower() == "mmsi" for name in self.names)
+        is_sure = number > 360.0 or number in (91.0, 181.0) or self.is_of_ships
         return {cell for cell in set(self.columns[at]) if self.number(cell) == number} if is_sure else set()
 
     def _words_or_nines(self, at: int) -> set[str]:
