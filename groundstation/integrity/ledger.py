@@ -327,7 +327,10 @@ def topic_ledger(
     increments_s: float | None = None,
     rhythm: Rhythm,
 ) -> TopicCounts:
-    """Ledger of one topic from its corrected times in order, shape (n,), n at least 1, and their rhythm."""
+    """Ledger of one topic, from its corrected times in order, shape (n,), and their rhythm.
+
+    There is at least one time.
+    """
     span_ns = int(rhythm.steps_ns.sum())
     ahead = rhythm.ahead
     return TopicCounts(

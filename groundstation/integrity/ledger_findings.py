@@ -57,7 +57,7 @@ def _contradiction(one: Contradiction, clock: ClockModel) -> Finding:
 
 
 def topic_findings(ledger: LedgerCounts) -> tuple[Finding, ...]:
-    """Return the findings about topics: silence of all, then of each its order, gaps, counters and values."""
+    """Return the findings about topics: silence of all; order, gaps, counters, values of each."""
     return (*_silences(ledger), *(finding for topic in ledger.topics for finding in _topic(topic, ledger)))
 
 
