@@ -193,6 +193,20 @@ class Dropouts:
 
 
 @dataclass(frozen=True, kw_only=True)
+class PauseEntry:
+    """Time in which nothing was logged, as the vehicle was disarmed.
+
+    ``start_s`` counts from the first record of the log, as flight time does.
+    """
+
+    schema_name: ClassVar[str] = "ledger_pause"
+
+    length_s: float
+    start: str
+    start_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Truncation:
     """Place where a log is cut, and how much of it is lost."""
 
@@ -211,6 +225,8 @@ class Ledger:
         Bytes that no record was made of; ``skipped_spans`` are [first, last, bytes].
     damages, remarks : tuples
         Losses and remarks of the reader.
+    pauses : tuple of PauseEntry
+        Times in which nothing was logged while the vehicle was disarmed: no gap of a topic.
     spans, spans_more
         Damaged spans of time, in order of time; how many more there are.
     topics : mapping of topic to TopicEntry
@@ -221,6 +237,7 @@ class Ledger:
     damages: tuple[DamageEntry, ...] = ()
     dropouts: Dropouts = field(default_factory=Dropouts)
     gap_definition: GapDefinition = field(default_factory=GapDefinition)
+    pauses: tuple[PauseEntry, ...] = field(default=(), metadata=LEFT_OUT_WHEN_DEFAULT)
     remarks: tuple[RemarkEntry, ...] = ()
     skipped_spans: tuple[tuple[int, int, int], ...] = ()
     spans: tuple[DamagedSpan, ...] = ()

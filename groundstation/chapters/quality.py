@@ -18,6 +18,7 @@ from groundstation.chapters.wording import (
     typeset,
     words,
 )
+from groundstation.chapters.wording import clock as clock_of_flight
 from groundstation.results.arrays.flight import LedgerRows
 from groundstation.results.flight import FlightResults
 
@@ -26,7 +27,7 @@ MOST_TOPICS = 60
 MOST_ENTRIES = 20
 MOST_DAMAGES = 60
 NOTHING = ("0", "no", "none", ABSENT)
-IN_TABLES = ("topics", "damages", "remarks", "spans", "spans_more", "steps", "relations")  # remarks are findings
+IN_TABLES = ("topics", "damages", "remarks", "spans", "spans_more", "steps", "relations", "pauses")  # remarks: findings
 STEP_HEADS = (
     *(Head(title, True) for title in ("Record", "Step, s", "Clock set by, s", "Records before it, moved")),
     Head("What"),
@@ -36,6 +37,8 @@ CLOCK_HEADS = (
     *(Head("Other − recorder"), Head("Drift of the recorder"), Head("Scatter, s", True)),
 )
 CLOCK_CAPTION = "±: standard error; positive drift: the recorder is fast. Drift does not change corrected time."
+PAUSE_HEADS = (Head("From"), Head("Flight time", True), Head("Length, s", True))
+PAUSE_CAPTION = "The autopilot logs nothing while disarmed: no gap. Rates and coverage are of the logged time."
 DAMAGE_HEADS = (Head("Kind"), Head("What"), Head("Where"), Head("Count", True), Head("Data lost"))
 WHOLE = "Nothing lost, nothing unreadable."
 
@@ -43,7 +46,7 @@ WHOLE = "Nothing lost, nothing unreadable."
 def quality(results: FlightResults) -> Section:
     """Return the chapter; every flight has a ledger."""
     parts = (
-        *(_damages(results.ledger), _topics(results), Figure("quality.gaps")),
+        *(_damages(results.ledger), _topics(results), _pauses(results.ledger), Figure("quality.gaps")),
         *(_clock_steps(results.clock), _other_clocks(results.clock)),
     )
     workings = (_nested(results.clock, "Clock model"), _nested(results.ledger, "Ledger of the log"))
@@ -84,6 +87,14 @@ def _topics(results: FlightResults) -> Grid | None:
     more = len(data) - len(rows)
     caption = f"{more} {'raw' if own else 'more'} topics in the table file." if more else ""
     return Grid("Topics", heads, rows, caption, ("ledger",))
+
+
+def _pauses(ledger: Ledger) -> Grid | None:
+    """Return the times in which nothing was logged; None without any."""
+    rows = [(one.start, clock_of_flight(one.start_s), number(one.length_s, 1)) for one in ledger.pauses[:MOST_ENTRIES]]
+    more = len(ledger.pauses) - len(rows)
+    caption = f"{PAUSE_CAPTION} {more} more in summary.json." if more else PAUSE_CAPTION
+    return Grid("Not logged", PAUSE_HEADS, rows, caption) if rows else None
 
 
 def _clock_steps(clock: Clock) -> Grid | None:

@@ -1,5 +1,8 @@
 """Topics that end before the others: records that their rate promises and no log holds."""
 
+import numpy as np
+
+from groundstation.base.gaps import logged_ns
 from groundstation.base.records import Damage
 from groundstation.base.signals import is_canonical, kind_of
 from groundstation.base.units import NS_PER_S
@@ -28,7 +31,8 @@ def broken_off(ledger: LedgerCounts) -> tuple[Damage, ...]:
             continue
         if not is_canonical(topic.topic) and topic.last_ns - topic.first_ns < ONCE_SHARE * (end_ns - ledger.start_ns):
             continue
-        rows = round(missing_s * topic.nominal_rate_hz)
+        ends_ns = logged_ns(np.array([topic.last_ns, end_ns]), ledger.pauses)
+        rows = round(int(ends_ns[1] - ends_ns[0]) / NS_PER_S * topic.nominal_rate_hz)
         what = f"{topic.topic} ends {missing_s:.1f} s before the log does, records missing at its rate"
         place = f"after {ledger.clock.text(topic.last_ns)}"
         is_loss = is_canonical(topic.topic) and kind_of(topic.topic) not in COME_AND_GO

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.records import Column, Int64Array, RecordBatch
-from groundstation.base.signals import is_canonical
+from groundstation.base.signals import is_canonical, kind_of
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.contradictions import Contradiction, contradictions
 from groundstation.integrity.inertial import InertialTally, is_inertial
 from groundstation.integrity.ledger import FieldCounts
 from groundstation.integrity.limits import Thresholds
+from groundstation.integrity.pauses import Arming, armings_in
 from groundstation.integrity.sequence import Counter, Sequence, counters_of
 from groundstation.integrity.spans import RecorderDropout, Timeline
 from groundstation.integrity.stretches import Constancy, RecordPlace, Sampler
@@ -22,7 +23,7 @@ from groundstation.integrity.stuck import Judge, MotionSampler, StuckPlace, is_w
 FloatArray = NDArray[np.float64]
 
 DROPOUTS, DROPOUT_LENGTH = "raw.ulog.dropouts", "duration_ms"
-MOST_DROPOUTS = 10_000
+MOST_DROPOUTS = MOST_ARMINGS = 10_000
 
 
 @dataclass
@@ -113,6 +114,7 @@ class Contents:
         self._motion = MotionSampler()
         self._timeline = Sampler()
         self._dropouts: list[tuple[RecordPlace, float]] = []
+        self._armings: list[tuple[RecordPlace, bool]] = []
         self._judge: Judge | None = None
 
     def add(self, batch: RecordBatch, device_ns: Int64Array | None = None) -> None:
@@ -138,6 +140,8 @@ class Contents:
             tally.inertial.add(batch)
         self._motion.add(batch, device_ns)
         self._sample(batch, device_ns)
+        if kind_of(batch.topic) == "event" and "name" in batch.columns:
+            self._add_armings(batch.columns["name"], batch.record_index, device_ns)
         if batch.topic == DROPOUTS and DROPOUT_LENGTH in batch.columns:
             self._add_dropouts(batch.columns[DROPOUT_LENGTH], batch.record_index, device_ns)
 
@@ -162,6 +166,14 @@ class Contents:
             length_s = float(column.values[at]) / 1e3
             if length_s > 0.0:
                 self._dropouts.append((RecordPlace(int(record_index[at]), int(device_ns[at])), length_s))
+
+    def _add_armings(self, column: Column, record_index: Int64Array, device_ns: Int64Array) -> None:
+        for at, is_armed in armings_in(column)[: MOST_ARMINGS - len(self._armings)]:
+            self._armings.append((RecordPlace(int(record_index[at]), int(device_ns[at])), is_armed))
+
+    def armings(self, clock: ClockModel) -> tuple[Arming, ...]:
+        """Changes between armed and disarmed that the events tell."""
+        return tuple(Arming(place.time_ns(clock), is_armed) for place, is_armed in self._armings)
 
     def fields(self, topic: str, clock: ClockModel) -> tuple[FieldCounts, ...]:
         """Ledgers of a topic's fields."""

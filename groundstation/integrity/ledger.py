@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from groundstation.base.gaps import Gaps
+from groundstation.base.gaps import Gaps, Pause
 from groundstation.base.ledger import (
     DamageEntry,
     Dropouts,
@@ -14,6 +14,7 @@ from groundstation.base.ledger import (
     GapDefinition,
     Ledger,
     OutOfRange,
+    PauseEntry,
     RemarkEntry,
     StuckStretch,
     TopicEntry,
@@ -26,7 +27,7 @@ from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.contradictions import Contradiction
 from groundstation.integrity.inertial import is_inertial
 from groundstation.integrity.limits import Thresholds, shipped
-from groundstation.integrity.rhythm import rhythm_of
+from groundstation.integrity.rhythm import Rhythm, rhythm_of
 from groundstation.integrity.sequence import Sequence
 from groundstation.integrity.source_clock import PowerUpClock
 from groundstation.integrity.spans import RecorderDropout, Span, Timeline, skipped_bytes, spans_of, truncation
@@ -102,7 +103,7 @@ class TopicCounts:
         From the median step; None where no step is usual: fewer than two distinct times, or a topic that is written
         when something happens.
     actual_rate_hz : float or None
-        Distinct times less one, over the span.
+        Distinct times less one, over the span without pauses.
     coverage : float or None
         Share of the samples expected at the nominal rate over the topic's span that are there, at most 1.
     duplicates, backward_steps, stray_rows : int
@@ -114,7 +115,9 @@ class TopicCounts:
     jitter_s : float or None
         Of an inertial unit: root mean square of its steps less the nominal one, gaps left out.
     increments_share : float or None
-        Share of the time that its increments cover.
+        Share of the logged time that its increments cover.
+    longest_s : float
+        Longest step that is no gap.
     """
 
     topic: str
@@ -132,6 +135,7 @@ class TopicCounts:
     sequences: tuple[Sequence, ...] = ()
     jitter_s: float | None = None
     increments_share: float | None = None
+    longest_s: float = math.inf
 
     @property
     def span_s(self) -> float:
@@ -170,7 +174,8 @@ class TopicCounts:
 class LedgerCounts:
     """Ledger of a log: topics in alphabetical order, clock, damage and remarks of the reader.
 
-    ``power_ups`` are those of the source, where it holds several.
+    ``power_ups`` are those of the source, where it holds several. Nothing was logged in ``pauses``, as the vehicle was
+    disarmed; in ``stops`` neither, and nothing tells why.
     """
 
     topics: tuple[TopicCounts, ...] = ()
@@ -182,6 +187,8 @@ class LedgerCounts:
     timeline: Timeline | None = None
     contradictions: tuple[Contradiction, ...] = ()
     power_ups: tuple[PowerUpClock, ...] = ()
+    pauses: tuple[Pause, ...] = ()
+    stops: tuple[Pause, ...] = ()
 
     def __getitem__(self, topic: str) -> TopicCounts:
         """Return the ledger of one topic; KeyError when the log has none of that name."""
@@ -230,6 +237,10 @@ class LedgerCounts:
             found += _spans_of_topic(topic)
         return tuple(sorted(found, key=lambda span: (span.start_ns, span.topic, span.field, span.cause)))
 
+    def _pause(self, one: Pause) -> PauseEntry:
+        start_s = round((one.start_ns - self.start_ns) / NS_PER_S, 3)
+        return PauseEntry(length_s=round(one.length_s, 3), start=self.clock.text(one.start_ns), start_s=start_s)
+
     def losses(self, topic: str) -> dict[str, int]:
         """Count the unreadable records of a topic by kind of damage."""
         counts: dict[str, int] = {}
@@ -250,6 +261,7 @@ class LedgerCounts:
             skipped_spans=skipped_spans,
             truncated=truncation(self.damages),
             dropouts=Dropouts(count=len(self.dropouts), total_s=round(sum(one.length_s for one in self.dropouts), 3)),
+            pauses=tuple(self._pause(one) for one in self.pauses),
             spans=tuple(span.entry(self.clock, self.start_ns) for span in spans[:SPANS_LISTED]),
             spans_more=max(0, len(spans) - SPANS_LISTED),
             damages=tuple(damage_entry(damage) for damage in self.damages),
@@ -287,10 +299,12 @@ def _spans_of_topic(topic: TopicCounts) -> list[Span]:
     return found
 
 
-def gaps_of(topic: str, time_ns: Int64Array, *, thresholds: Thresholds | None = None) -> Gaps:
+def gaps_of(
+    topic: str, time_ns: Int64Array, *, thresholds: Thresholds | None = None, pauses: tuple[Pause, ...] = ()
+) -> Gaps:
     """Gaps of a topic by the thresholds, from its corrected times in order, shape (n,).
 
-    Topics that are written when something happens (events) have none.
+    Topics that are written when something happens (events) have none. Time in ``pauses`` of the log is in none.
 
     Examples
     --------
@@ -299,7 +313,7 @@ def gaps_of(topic: str, time_ns: Int64Array, *, thresholds: Thresholds | None = 
     ([2000000000], [7.0])
     """
     limits = thresholds or shipped()
-    return rhythm_of(topic, time_ns, limits).gaps(topic, time_ns)
+    return rhythm_of(topic, time_ns, limits, pauses).gaps(topic, time_ns)
 
 
 def topic_ledger(
@@ -311,11 +325,13 @@ def topic_ledger(
     fields: tuple[FieldCounts, ...],
     sequences: tuple[Sequence, ...] = (),
     increments_s: float | None = None,
-    thresholds: Thresholds,
+    rhythm: Rhythm,
 ) -> TopicCounts:
-    """Ledger of one topic from its corrected times in order, shape (n,), n at least 1."""
-    rhythm = rhythm_of(topic, time_ns, thresholds)
-    span_ns = int(time_ns[-1] - time_ns[0])
+    """Ledger of one topic, from its corrected times in order, shape (n,), and their rhythm.
+
+    There is at least one time.
+    """
+    span_ns = int(rhythm.steps_ns.sum())
     ahead = rhythm.ahead
     return TopicCounts(
         topic,
@@ -333,6 +349,7 @@ def topic_ledger(
         sequences=sequences,
         jitter_s=rhythm.jitter_s if is_inertial(topic) and rhythm.has_rate else None,
         increments_share=increments_s * NS_PER_S / span_ns if increments_s and span_ns else None,
+        longest_s=rhythm.longest_ns / NS_PER_S,
     )
 
 

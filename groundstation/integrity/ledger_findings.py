@@ -2,9 +2,13 @@
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from groundstation.base.findings import Finding, Severity
+from groundstation.base.gaps import Gaps, Pause
 from groundstation.base.records import Damage
 from groundstation.base.signals import is_canonical
+from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.clock_findings import clock_findings, counted
 from groundstation.integrity.contradictions import CONTRADICTION, Contradiction
@@ -13,7 +17,7 @@ from groundstation.integrity.limits import DuplicateLimits
 from groundstation.integrity.sequence import Sequence
 
 TOPIC_CODES = (
-    *("time.duplicates", "data.gaps", "data.sequence", "data.sequence_reset"),
+    *("time.duplicates", "data.not_logged", "data.silent", "data.gaps", "data.sequence", "data.sequence_reset"),
     *("values.out_of_range", "values.nan", "values.stuck", "values.saturated", "data.increments"),
 )
 WHOLE_SHARE = 0.9  # of the time: increments that cover less have gaps, or were thinned out
@@ -35,7 +39,8 @@ _REMARKS_THAT_WARN = (
 def ledger_findings(ledger: LedgerCounts) -> tuple[Finding, ...]:
     """Findings of a ledger: clock first, then losses, topics and the reader's remarks.
 
-    Codes: those of :func:`clock_findings`, ``time.duplicates``, ``data.none``, ``data.gaps``, ``data.contradiction``,
+    Codes: those of :func:`clock_findings`, ``time.duplicates``, ``data.none``, ``data.not_logged`` (a pause of the log
+    while disarmed), ``data.silent`` (all topics stop at once), ``data.gaps``, ``data.contradiction``,
     ``data.<kind of damage>`` (``data.truncated``, ``data.dropped_rows``, ``data.breaks_off`` ...),
     ``data.sequence``, ``data.sequence_reset``, ``values.out_of_range``, ``values.nan``, ``values.stuck``,
     ``values.saturated`` and ``data.increments`` (inertial units),
@@ -52,8 +57,42 @@ def _contradiction(one: Contradiction, clock: ClockModel) -> Finding:
 
 
 def topic_findings(ledger: LedgerCounts) -> tuple[Finding, ...]:
-    """Return the findings about topics: order, gaps, counters and values."""
-    return tuple(finding for topic in ledger.topics for finding in _topic(topic, ledger))
+    """Return the findings about topics: silence of all; order, gaps, counters, values of each."""
+    return (*_silences(ledger), *(finding for topic in ledger.topics for finding in _topic(topic, ledger)))
+
+
+def _silences(ledger: LedgerCounts) -> Iterator[Finding]:
+    """Yield a finding on the pauses of the log, and one on stops that nothing explains."""
+    if ledger.pauses:
+        often, place = _often(ledger.pauses, ledger.clock)
+        yield Finding("info", "data.not_logged", f"nothing logged while disarmed{often}", "", place, len(ledger.pauses))
+    if ledger.stops:
+        often, place = _often(ledger.stops, ledger.clock)
+        yield Finding("warn", "data.silent", f"nothing recorded of any topic{often}", "", place, len(ledger.stops))
+
+
+def _often(found: tuple[Pause, ...], clock: ClockModel) -> tuple[str, str]:
+    """Return the lengths of silences in words, and the place of the longest."""
+    longest = max(found, key=lambda one: one.length_s)
+    place = f"from {clock.text(longest.start_ns)} to {clock.text(longest.end_ns)}"
+    if len(found) == 1:
+        return f": {longest.length_s:.1f} s {place}", place
+    together_s = sum(one.length_s for one in found)
+    times = f" {len(found)} times: {together_s:.1f} s together"
+    return f"{times}, the longest {longest.length_s:.1f} s {place}", place
+
+
+def _own_gaps(topic: TopicCounts, stops: tuple[Pause, ...]) -> Gaps:
+    """Return the gaps of a topic without those that are stops of the whole log."""
+    if not stops or not len(topic.gaps):
+        return topic.gaps
+    start_ns, length_s = topic.gaps.start_ns, topic.gaps.length_s
+    end_ns = start_ns + np.round(length_s * NS_PER_S).astype(np.int64)
+    left_s = length_s.copy()
+    for stop in stops:
+        left_s -= np.maximum(np.minimum(end_ns, stop.end_ns) - np.maximum(start_ns, stop.start_ns), 0) / NS_PER_S
+    own = np.flatnonzero(left_s > topic.longest_s)
+    return Gaps(topic.topic, start_ns[own], length_s[own])
 
 
 def damage_finding(damage: Damage) -> Finding:
@@ -80,15 +119,16 @@ def _duplicates(topic: TopicCounts, clock: ClockModel, limits: DuplicateLimits) 
 def _topic(topic: TopicCounts, ledger: LedgerCounts) -> Iterator[Finding]:
     if topic.duplicates:
         yield _duplicates(topic, ledger.clock, ledger.thresholds.duplicates)
-    if len(topic.gaps):
-        longest = int(topic.gaps.length_s.argmax())
-        place = ledger.clock.text(int(topic.gaps.start_ns[longest]))
+    gaps = _own_gaps(topic, ledger.stops)
+    if len(gaps):
+        longest = int(gaps.length_s.argmax())
+        place = ledger.clock.text(int(gaps.start_ns[longest]))
         text = (
-            f"{topic.topic}: {counted(len(topic.gaps), 'gap')}, {topic.gaps.length_s.sum():.1f} s together, "
-            f"the longest {topic.gaps.length_s[longest]:.1f} s after {place}"
+            f"{topic.topic}: {counted(len(gaps), 'gap')}, {gaps.length_s.sum():.1f} s together, "
+            f"the longest {gaps.length_s[longest]:.1f} s after {place}"
         )
         severity: Severity = "warn" if is_canonical(topic.topic) else "info"  # nothing is estimated from raw topics
-        yield Finding(severity, "data.gaps", text, topic.topic, place, len(topic.gaps))
+        yield Finding(severity, "data.gaps", text, topic.topic, place, len(gaps))
     for sequence in topic.sequences:
         yield from _sequence(topic.topic, sequence, ledger.clock)
     if topic.increments_share is not None and topic.increments_share < WHOLE_SHARE:

@@ -16,6 +16,7 @@ from groundstation.base.ledger import ThresholdsUsed
 from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.signals import TOPICS, field_of, kind_of
 from groundstation.base.toml_settings import required_number, settings_from, trusted
+from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock_references import RelationSettings
 from groundstation.integrity.clock_steps import ClockSettings
 from groundstation.integrity.counting import CountingSettings
@@ -37,6 +38,11 @@ class GapLimits:
     min_s: float = required_number(0.0)
     end_s: float = required_number(0.0)
     end_share: float = required_number(0.0, 1.0)
+
+    @property
+    def min_ns(self) -> int:
+        """Nanoseconds that a gap lasts at least."""
+        return round(self.min_s * NS_PER_S)
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,12 @@
 """Rhythm of a topic: its usual step in time, whether that is a period, and its gaps."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 import numpy as np
 
-from groundstation.base.gaps import Gaps
+from groundstation.base.gaps import Gaps, Pause, logged_ns
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import is_canonical
 from groundstation.base.units import NS_PER_S
@@ -24,7 +25,7 @@ class Rhythm:
     Parameters
     ----------
     steps_ns : ndarray of int64
-        All steps, none below zero.
+        All steps, none below zero; a pause of the log counts in none.
     ahead : int
         Number of steps ahead in time.
     period_ns : float
@@ -33,6 +34,8 @@ class Rhythm:
         The usual step is a period: there is a nominal rate and a coverage.
     has_gaps : bool
         A long step is a gap.
+    pauses : tuple of Pause
+        Those of the log; ``paused`` are the steps that they cut short.
     """
 
     steps_ns: Int64Array
@@ -41,6 +44,8 @@ class Rhythm:
     has_rate: bool
     has_gaps: bool
     limits: GapLimits
+    pauses: tuple[Pause, ...] = ()
+    paused: tuple[int, ...] = ()
 
     @property
     def coverage(self) -> float:
@@ -51,38 +56,65 @@ class Rhythm:
     @property
     def jitter_s(self) -> float:
         """Root mean square of the steps less the period, without gaps."""
-        inside = self.steps_ns[self.steps_ns <= _longest_ns(self.period_ns, self.limits)]
+        inside = np.delete(self.steps_ns, self.paused)
+        inside = inside[inside <= self.longest_ns]
         return float(np.sqrt(np.mean(np.square(inside - self.period_ns)))) / NS_PER_S if len(inside) else 0.0
 
+    @property
+    def longest_ns(self) -> float:
+        """Longest step that is no gap."""
+        return _longest_ns(self.period_ns, self.limits)
+
     def gaps(self, topic: str, time_ns: Int64Array) -> Gaps:
-        """Return the steps that are too long, for the times that the steps are of."""
+        """Return the steps that are too long, for the times that the steps are of.
+
+        A step with a pause in it is judged by its parts before and behind.
+        """
         if not self.has_gaps:
             return Gaps(topic, np.zeros(0, dtype=np.int64), np.zeros(0))
-        before = np.flatnonzero(self.steps_ns > _longest_ns(self.period_ns, self.limits))
-        return Gaps(topic, time_ns[before], self.steps_ns[before] / NS_PER_S)
+        start_ns, end_ns = self.steps_beyond(time_ns, self.longest_ns)
+        return Gaps(topic, start_ns, (end_ns - start_ns) / NS_PER_S)
+
+    def steps_beyond(self, time_ns: Int64Array, least_ns: float) -> tuple[Int64Array, Int64Array]:
+        """Return from and to of the steps longer than the least, pauses cut out."""
+        steps_ns = self.steps_ns
+        ends = [end for pause in self.pauses for end in pause if time_ns[0] < end < time_ns[-1]]
+        if ends:
+            time_ns = np.sort(np.concatenate((time_ns, np.array(ends, dtype=np.int64))), kind="stable")
+            steps_ns = np.diff(logged_ns(time_ns, self.pauses))
+        before = np.flatnonzero(steps_ns > least_ns)
+        return time_ns[before], time_ns[before + 1]
 
 
-def rhythm_of(topic: str, time_ns: Int64Array, thresholds: Thresholds) -> Rhythm:
+def rhythm_of(topic: str, time_ns: Int64Array, thresholds: Thresholds, pauses: Sequence[Pause] = ()) -> Rhythm:
     """The rhythm of a topic, from its corrected times in order, shape (n,).
 
     A topic that is written when something happens has none: by its name, by too few or too uneven steps, or by bursts:
     all at one moment (definitions, units, lists) or with pauses between. A topic whose usual step leaves a good part of
     the time without an explanation (records that come in pairs, a wavering timer) has gaps, if it is canonical, by its
-    mean step, but no nominal rate.
+    mean step, but no nominal rate. Time within ``pauses`` of the log is no time of the topic.
     """
-    limits, steps = thresholds.rhythm, np.diff(time_ns)
+    limits, steps = thresholds.rhythm, _steps_ns(time_ns, pauses)
     ahead = steps[steps > 0]
     if not len(ahead):
         return Rhythm(steps, 0, 0.0, False, False, thresholds.gaps)
     some = np.sort(ahead[:: len(ahead) // MOST_STEPS | 1])  # odd: two steps in turn are both met
     usual_ns = quantile(some, 0.5)
-    found = Rhythm(steps, len(ahead), usual_ns, True, True, thresholds.gaps)
+    rows = (int(np.searchsorted(time_ns, one.start_ns, "right")) - 1 for one in pauses)
+    paused = tuple(row for row in rows if 0 <= row < len(steps))
+    found = Rhythm(steps, len(ahead), usual_ns, True, True, thresholds.gaps, tuple(pauses), paused)
     if _is_sporadic(topic, found, quantile(some, 0.8), limits):
-        return Rhythm(steps, len(ahead), usual_ns, False, False, thresholds.gaps)
+        return replace(found, has_rate=False, has_gaps=False)
     if _is_unexplained(found, limits):
         mean_ns = int(steps.sum()) / len(ahead)
-        return Rhythm(steps, len(ahead), mean_ns, False, is_canonical(topic), thresholds.gaps)
+        return replace(found, period_ns=mean_ns, has_rate=False, has_gaps=is_canonical(topic))
     return found
+
+
+def _steps_ns(time_ns: Int64Array, pauses: Sequence[Pause]) -> Int64Array:
+    """Return the steps of logged time; one over a pause stays a step ahead."""
+    steps_ns = np.diff(time_ns)
+    return np.maximum(np.diff(logged_ns(time_ns, pauses)), np.minimum(steps_ns, 1)) if pauses else steps_ns
 
 
 def _longest_ns(period_ns: float, limits: GapLimits) -> float:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from groundstation.base.gaps import Gaps
+from groundstation.base.gaps import Gaps, Pause
 from groundstation.base.records import Damage, Int64Array, Item, LogHeader, NewLog, RecordBatch, Remark
 from groundstation.integrity.breaks_off import broken_off
 from groundstation.integrity.clock import ClockModel
@@ -21,7 +21,9 @@ from groundstation.integrity.clock_references import ClockReferences
 from groundstation.integrity.contents import Contents
 from groundstation.integrity.ledger import LedgerCounts, TopicCounts, topic_ledger
 from groundstation.integrity.limits import Thresholds, shipped
+from groundstation.integrity.pauses import Outline, outline_of, pauses_of, stops_of
 from groundstation.integrity.places import PieceOnDisk, Places
+from groundstation.integrity.rhythm import rhythm_of
 from groundstation.integrity.source_clock import ClockPass, PowerUpClock, clock_of
 
 
@@ -141,14 +143,49 @@ def _surveyed(items: Iterable[Item], places: Places, limits: Thresholds) -> Surv
             header = item
     clock, parts = clock_of(ClockPass(header, tuple(new_logs), places, pieces, references), limits)
     clock = replace(clock, relations=references.relations(clock))
-    results = _ledgers(places, pieces, contents, clock, limits) if clock.has_times else []
-    topics = tuple(ledger for ledger, _lateness in results)
+    results, silences = _NO_TOPICS, _Silences()
+    if clock.has_times:
+        results = _ledgers(places, pieces, contents, clock, limits)
+        silences = _Silences.of(results.outlines, contents, clock, limits)
+        if silences.pauses:
+            results = _ledgers(places, pieces, contents, clock, limits, silences.pauses)
+            silences = silences.without_pauses(results.outlines, limits)
+    topics = results.topics
     remarks += doubtful_dates(header.reader, clock, topics, remarks)
-    clock = replace(clock, lateness_ns={ledger.topic: lateness for ledger, lateness in results})
+    clock = replace(clock, lateness_ns=results.lateness_ns)
     dropouts, timeline = (contents.dropouts(clock), contents.timeline(clock)) if clock.has_times else ((), None)
     against = contents.contradictions(clock, header.metadata) if clock.has_times else ()
-    ledger = LedgerCounts(topics, clock, tuple(damages), tuple(remarks), limits, dropouts, timeline, against, parts)
+    told = tuple(damages), tuple(remarks), limits, dropouts, timeline, against, parts
+    ledger = LedgerCounts(topics, clock, *told, *silences)
     return Survey(header, clock, replace(ledger, damages=(*damages, *broken_off(ledger))))
+
+
+class _Silences(NamedTuple):
+    """Pauses of a log, and its stops that nothing explains."""
+
+    pauses: tuple[Pause, ...] = ()
+    stops: tuple[Pause, ...] = ()
+
+    @classmethod
+    def of(cls, outlines: Sequence[Outline], contents: Contents, clock: ClockModel, limits: Thresholds) -> "_Silences":
+        """Return the silences that topics show; stops only where there is no pause."""
+        pauses = pauses_of(outlines, contents.armings(clock), limits.gaps)
+        return cls(pauses, () if pauses else stops_of(outlines, limits.gaps))
+
+    def without_pauses(self, outlines: Sequence[Outline], limits: Thresholds) -> "_Silences":
+        """Return the silences with the stops beside pauses, by topics that know these."""
+        return _Silences(self.pauses, stops_of(outlines, limits.gaps))
+
+
+class _Ledgers(NamedTuple):
+    """Ledgers of topics by name, how late their records are, outlines of their times."""
+
+    topics: tuple[TopicCounts, ...]
+    lateness_ns: dict[str, int]
+    outlines: tuple[Outline, ...]
+
+
+_NO_TOPICS = _Ledgers((), {}, ())
 
 
 def _ledgers(
@@ -157,18 +194,20 @@ def _ledgers(
     contents: Contents,
     clock: ClockModel,
     limits: Thresholds,
-) -> list[tuple[TopicCounts, int]]:
-    """Return ledgers and latenesses of all topics in alphabetical order.
+    pauses: tuple[Pause, ...] = (),
+) -> _Ledgers:
+    """Return the ledgers of all topics.
 
-    Topics that are sampled together share theirs.
+    Topics that are sampled together share times and lateness.
     """
     together: dict[tuple[int, ...], list[str]] = {}
     for topic, several in pieces.items():
         together.setdefault(tuple(kept.number for kept in several), []).append(topic)
-    results = []
+    ledgers, lateness_ns, outlines = [], {}, []
     for topics in together.values():
         order = _order_of(places, pieces[topics[0]], clock)
         for topic in topics:
+            rhythm = rhythm_of(topic, order.valid_ns, limits, pauses)
             ledger = topic_ledger(
                 topic,
                 order.valid_ns,
@@ -177,10 +216,13 @@ def _ledgers(
                 fields=contents.fields(topic, clock),
                 sequences=contents.sequences(topic, clock),
                 increments_s=contents.increments_s(topic),
-                thresholds=limits,
+                rhythm=rhythm,
             )
-            results.append((ledger, order.lateness_ns))
-    return sorted(results, key=lambda result: result[0].topic)
+            ledgers.append(ledger)
+            lateness_ns[topic] = order.lateness_ns
+            outlines.append(outline_of(topic, order.valid_ns, rhythm, limits.gaps))
+    ledgers.sort(key=lambda ledger: ledger.topic)
+    return _Ledgers(tuple(ledgers), lateness_ns, tuple(one for one in outlines if one is not None))
 
 
 class Census:
@@ -204,19 +246,32 @@ class Census:
 
     def ledger(self, damages: Sequence[Damage] = ()) -> LedgerCounts:
         """Return the ledger of the file; device order and device clock are not in it."""
-        topics = [
-            topic_ledger(
-                topic,
-                np.sort(np.concatenate(times), kind="stable"),
-                backward_steps=0,
-                stray_rows=0,
-                fields=self._contents.fields(topic, self._clock),
-                sequences=self._contents.sequences(topic, self._clock),
-                increments_s=self._contents.increments_s(topic),
-                thresholds=self._thresholds,
-            )
-            for topic, times in sorted(self._times.items())
-        ]
-        clock, contents = self._clock, self._contents
+        clock, contents, limits = self._clock, self._contents, self._thresholds
+        counted = self._counted(())
+        silences = _Silences.of(counted.outlines, contents, clock, limits)
+        if silences.pauses:
+            counted = self._counted(silences.pauses)
+            silences = silences.without_pauses(counted.outlines, limits)
         dropouts, timeline = contents.dropouts(clock), contents.timeline(clock)
-        return LedgerCounts(tuple(topics), clock, tuple(damages), (), self._thresholds, dropouts, timeline)
+        return LedgerCounts(counted.topics, clock, tuple(damages), (), limits, dropouts, timeline, (), (), *silences)
+
+    def _counted(self, pauses: tuple[Pause, ...]) -> _Ledgers:
+        contents, limits = self._contents, self._thresholds
+        ledgers, outlines = [], []
+        for topic, pieces in sorted(self._times.items()):
+            time_ns = np.sort(np.concatenate(pieces), kind="stable")
+            rhythm = rhythm_of(topic, time_ns, limits, pauses)
+            ledgers.append(
+                topic_ledger(
+                    topic,
+                    time_ns,
+                    backward_steps=0,
+                    stray_rows=0,
+                    fields=contents.fields(topic, self._clock),
+                    sequences=contents.sequences(topic, self._clock),
+                    increments_s=contents.increments_s(topic),
+                    rhythm=rhythm,
+                )
+            )
+            outlines.append(outline_of(topic, time_ns, rhythm, limits.gaps))
+        return _Ledgers(tuple(ledgers), {}, tuple(one for one in outlines if one is not None))

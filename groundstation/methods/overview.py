@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.gaps import Gaps
+from groundstation.base.gaps import Gaps, logged_ns
 from groundstation.base.ledger import Ledger
 from groundstation.base.nearest import nearest_rows
 from groundstation.base.records import Int64Array
@@ -36,6 +36,7 @@ ALSO = (
     ("pressure_altitude_m", "baro", ("altitude_m",)),
     ("height_above_airfield_m", "baro", ("altitude_m", "pressure_altitude_m")),
 )
+NO_GNSS, NOT_LOGGED = "no GNSS", "not logged"
 MODE = "mode "  # what the names of events that change the flight mode begin with
 
 
@@ -58,7 +59,7 @@ def runs_of(states: NDArray[np.str_], time_s: NDArray[np.float64], end_s: float)
 def gnss_lanes(flight: Flight, geometry_limit: float) -> GnssLanes | None:
     """Return the state of GNSS over the flight.
 
-    Good, geometry above the limit, integrity lost, no geometry factor, no GNSS.
+    Good, geometry above the limit, integrity lost, no geometry factor, no GNSS; not logged in a pause of the log.
     """
     topic = first_of_kind(flight, "gnss", "velocity_north_mps") or first_of_kind(flight, "gnss", "latitude_deg")
     if topic is None:
@@ -73,20 +74,35 @@ def gnss_lanes(flight: Flight, geometry_limit: float) -> GnssLanes | None:
         states[factor > geometry_limit] = f"{name} > {geometry_limit:g}"
     if table.has("integrity_ok"):
         states[table.values("integrity_ok") == 0.0] = "integrity lost"
-    step_s = np.diff(time_s)
+    step_s = np.diff(flight.seconds(logged_ns(table.time_ns, flight.pauses)))
     if len(step_s):
         limit_s = max(GAP_PERIODS * float(np.median(step_s)), LARGEST_QUIET_GAP_S)
         after = np.flatnonzero(step_s > limit_s)
         at = after + 1
-        states, time_s = np.insert(states, at, "no GNSS"), np.insert(time_s, at, time_s[after])
+        states, time_s = np.insert(states, at, NO_GNSS), np.insert(time_s, at, time_s[after])
     lanes = runs_of(states, time_s, flight.duration_s)
     if time_s.size and time_s[-1] < flight.duration_s - LARGEST_QUIET_GAP_S:
         lanes = GnssLanes(
             start_s=np.r_[lanes.start_s, time_s[-1]],
             end_s=np.r_[lanes.end_s[:-1], time_s[-1], flight.duration_s],
-            state=np.r_[lanes.state, np.array(["no GNSS"])],
+            state=np.r_[lanes.state, np.array([NO_GNSS])],
         )
-    return lanes
+    return _paused(lanes, flight)
+
+
+def _paused(lanes: GnssLanes, flight: Flight) -> GnssLanes:
+    """Return lanes with the pauses of the log laid over them."""
+    start_s, end_s, state = lanes.start_s, lanes.end_s, lanes.state.astype("U24")
+    for pause in flight.pauses:
+        from_s, to_s = flight.seconds(np.array(pause)).tolist()
+        if not len(start_s) or not start_s[0] <= from_s < end_s[-1]:
+            continue
+        before, behind = start_s < from_s, end_s > to_s
+        begun = np.r_[start_s[before], from_s, np.maximum(start_s[behind], to_s)]
+        ended = np.r_[np.minimum(end_s[before], from_s), to_s, end_s[behind]]
+        state = np.r_[state[before], np.array([NOT_LOGGED]), state[behind]]
+        start_s, end_s = begun, ended
+    return GnssLanes(start_s=start_s, end_s=end_s, state=state)
 
 
 def overview(flight: Flight, true_heading_deg: NDArray[np.float64] | None, ins_topic: str | None) -> Overview | None:

@@ -75,7 +75,8 @@ def wholeness(results: FlightResults) -> str:
         f"the recorder paused for {ledger.dropouts.total_s:.3g} s" if ledger.dropouts.count else "",
     )
     found = [text for text in lost if text]
-    return "; ".join(found) if found else "nothing lost" if results.status != "degraded" else "some of it lost"
+    told = found or ["nothing lost" if results.status != "degraded" else "some of it lost"]
+    return "; ".join(filter(None, (*told, _pauses(ledger))))
 
 
 def great_loss(results: FlightResults) -> str:
@@ -161,6 +162,12 @@ def _gaps(ledger: Ledger) -> str:
         return ""
     name, one = max(known.items(), key=lambda pair: (kind_of(pair[0]) in ("gnss", "ins"), pair[1].gaps.total_s))
     return f"{_length(one.gaps.total_s)} of {_name(name)} missing, {_longest(one.gaps.count, one.gaps.longest_s)}"
+
+
+def _pauses(ledger: Ledger) -> str:
+    """Return the time that was left out on purpose; empty where there is none."""
+    paused_s = sum(one.length_s for one in ledger.pauses)
+    return f"nothing logged for {_length(paused_s)} while disarmed" if ledger.pauses else ""
 
 
 def _longest(count: int, longest_s: float) -> str:

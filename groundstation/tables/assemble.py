@@ -7,9 +7,12 @@ from types import MappingProxyType
 import numpy as np
 
 from groundstation.base.errors import GroundstationError
+from groundstation.base.gaps import Pause
 from groundstation.base.geodesy import MOST_ON_EARTH_DEG
+from groundstation.base.ledger import PauseEntry
 from groundstation.base.records import MAX_BATCH_ROWS, Column, RecordBatch
 from groundstation.base.signals import has_values, is_canonical
+from groundstation.base.units import NS_PER_S
 from groundstation.tables.growing import GrowingTable, time_of_validity_ns, unless_all
 from groundstation.tables.table import Flight, Table
 
@@ -23,6 +26,7 @@ def flight_from_batches(
     has_utc: bool,
     source_name: str,
     rows: Mapping[str, int] = NOT_TOLD,
+    pauses: Iterable[PauseEntry] = (),
 ) -> Flight:
     """Gather batches into one table per topic, in order of time of validity.
 
@@ -36,6 +40,8 @@ def flight_from_batches(
         As in :class:`Flight`.
     rows : mapping of topic to int
         Rows to be expected, as a ledger counts them: each column is then made once. More or fewer do no harm.
+    pauses : iterable of PauseEntry
+        Those of the ledger.
 
     Returns
     -------
@@ -83,7 +89,9 @@ def flight_from_batches(
         alone, several = first.pop(topic), growing.pop(topic, None)
         tables[topic] = _in_order(_of_one(alone) if several is None else several.table())
     start_ns = min((*(int(table.time_ns[0]) for table in tables.values()), *starts_ns), default=0)
-    return Flight(tables, metadata, start_ns, has_utc, source_name)
+    ends_s = ((one.start_s, one.start_s + one.length_s) for one in pauses)
+    paused = (Pause(*(start_ns + round(end_s * NS_PER_S) for end_s in ends)) for ends in ends_s)
+    return Flight(tables, metadata, start_ns, has_utc, source_name, tuple(paused))
 
 
 def batches_from_flight(flight: Flight, max_rows: int = MAX_BATCH_ROWS) -> Iterator[RecordBatch]:

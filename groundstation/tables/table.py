@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.errors import NotAssessableError, UnknownNameError, UsageError
+from groundstation.base.gaps import Pause
 from groundstation.base.records import BoolArray, Column, Int64Array, frozen
 from groundstation.base.signals import RAW_PREFIX, TOPICS, field_of, is_canonical, is_field_name, kind_of
 from groundstation.base.source_units import source_units
@@ -309,6 +310,8 @@ class Flight:
         True where corrected time is UTC; False means NOTIME: nanoseconds since the log's own zero.
     source_name : str
         Name of the log file, without folders.
+    pauses : tuple of Pause
+        Times in which nothing was logged, as the vehicle was disarmed, in order.
     """
 
     tables: Mapping[str, Table]
@@ -316,6 +319,7 @@ class Flight:
     start_ns: int = 0
     has_utc: bool = False
     source_name: str = ""
+    pauses: tuple[Pause, ...] = ()
     _made: dict[Hashable, Any] = field(default_factory=dict, init=False, compare=False)
 
     def __post_init__(self) -> None:

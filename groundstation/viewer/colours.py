@@ -71,6 +71,7 @@ GNSS_STATES: Final[dict[str, Colour]] = {
     "no geometry factor": GREY,
     "integrity lost": VERMILION,
     "no GNSS": DIM,
+    "not logged": LIGHT,
 }
 GATES: Final[dict[str, Colour]] = {
     "used": GREEN,
@@ -96,7 +97,7 @@ STATES: Final[dict[str, Colour]] = {
     "in the air": SKY,
 }
 FILTER_STATES: Final[dict[str, Colour]] = {"GNSS used": GREEN, "forecast": ORANGE, "GNSS not used": GREY}
-DATA_STATES: Final[dict[str, Colour]] = {"data": GREEN, "gap": VERMILION}
+DATA_STATES: Final[dict[str, Colour]] = {"data": GREEN, "gap": VERMILION, "not logged": LIGHT}
 FLAGS: Final[dict[str, Colour]] = {"yes": GREEN, "no": GREY}
 SEVERITIES: Final[dict[str, Colour]] = {"info": LIGHT, "warn": ORANGE, "fail": VERMILION}
 STATES_OF_LANES: Final[dict[str, Colour]] = {**STATES, **FILTER_STATES, **GNSS_STATES, **PHASES, **GATES}

@@ -237,7 +237,7 @@ def found_for(times_s: list[float]) -> Survey:
         ([NAN, NAN], "clock.no_times", "fail"),
         ([], "data.none", "fail"),
         ([0, 1, 1, 2, 3], "time.duplicates", "info"),
-        ([0, 1, 2, 30, 31], "data.gaps", "warn"),
+        ([0, 1, 2, 30, 31], "data.silent", "warn"),
     ],
 )
 def test_each_oddity_is_one_line(times_s: list[float], code: str, severity: str) -> None:

@@ -93,7 +93,10 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
     found, known = answers_of(flight, configuration)
     flight = flight.without(TRUTH)
     thresholds = configuration.thresholds
-    gaps = {name: gaps_of(name, flight[name].time_ns, thresholds=thresholds) for name in flight.topics()}
+    gaps = {
+        name: gaps_of(name, flight[name].time_ns, thresholds=thresholds, pauses=flight.pauses)
+        for name in flight.topics()
+    }
     findings = [*given.findings, *(Finding("warn", "plug_in.system", line) for line in systems().failures)]
     if known.phases.vehicle.contradiction:
         findings.append(Finding("warn", CONTRADICTION, known.phases.vehicle.contradiction))

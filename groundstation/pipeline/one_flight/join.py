@@ -354,6 +354,7 @@ def _merged(
         topics=dict(sorted(item for one in ledgers for item in one.topics.items())),
         spans=tuple(spans),
         spans_more=sum(one.spans_more for one in ledgers),
+        pauses=(),  # of one recorder each: the others went on
         damages=(*map(damage_entry, left_out), *(damage for one in ledgers for damage in one.damages)),
         remarks=tuple(remark for one in ledgers for remark in one.remarks),
         bytes_skipped=sum(one.bytes_skipped for one in ledgers),

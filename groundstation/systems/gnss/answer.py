@@ -30,10 +30,13 @@ STATE_NAMES: Mapping[str, str] = MappingProxyType(
         "none": "no fix",
         "no_record": "nothing recorded",
         "log_silent": "log paused",  # of all sensors
+        "not_logged": "disarmed, not logged",  # and so by the autopilot's setting
     }
 )
 WITHOUT_RECORD = ("no_record", "log_silent")  # between rows: only the receiver is silent, or all of the log
+NOT_LOGGED = "not_logged"  # no time of the receiver: it has no share, and is no loss
 WITHOUT_FIX = ("dead_reckoning", "integrity_lost", "none")  # rows in them are time lost
+NO_FIXES = (*WITHOUT_FIX, *WITHOUT_RECORD, NOT_LOGGED)
 COARSE = 2.0  # times the scatter: a coarser step of the logged places hides it
 
 
@@ -41,6 +44,7 @@ COARSE = 2.0  # times the scatter: a coarser step of the logged places hides it
 class FixState:
     """Time that a receiver spent in a state: seconds, share of its time, spells, the longest.
 
+    Its time is the logged one: a pause of the log while disarmed has the share 0.
     ``claimed_m`` is the median sigma of the horizontal position that it claims in this state; None where it is not
     logged, or in fewer than ten rows.
     """
@@ -209,7 +213,12 @@ class GnssReceiver(Brief):
     @property
     def fixes(self) -> tuple[FixState, ...]:
         """States with a fix, the best first."""
-        return tuple(one for one in self.states if one.state not in (*WITHOUT_FIX, *WITHOUT_RECORD))
+        return tuple(one for one in self.states if one.state not in NO_FIXES)
+
+    @property
+    def not_logged_s(self) -> float:
+        """Seconds between its rows in which the log paused while disarmed."""
+        return sum(one.seconds for one in self.states if one.state == NOT_LOGGED)
 
     @property
     def told_standstill(self) -> StandstillScatter | None:
@@ -225,7 +234,8 @@ class GnssReceiver(Brief):
     def share_after_first_fix(self, *states: str) -> float:
         """Share of the recorded time after the first fix in some states."""
         before_s = 0.0 if self.first_fix_s is None else self.first_fix_s - self.start_s
-        every = [(one.state, one.seconds) for one in self.states if one.state not in WITHOUT_RECORD]
+        unrecorded = (*WITHOUT_RECORD, NOT_LOGGED)
+        every = [(one.state, one.seconds) for one in self.states if one.state not in unrecorded]
         fixed_s = sum(seconds for state, seconds in every if state not in WITHOUT_FIX)
         whole_s = max(
             sum(seconds for _state, seconds in every) - before_s, fixed_s

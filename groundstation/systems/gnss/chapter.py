@@ -7,9 +7,8 @@ from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, Tone, kept
 from groundstation.chapters.wording import clock, number, typeset, with_full_stop
 from groundstation.results.flight import FlightResults
+from groundstation.systems.gnss.answer import NOT_LOGGED as UNLOGGED
 from groundstation.systems.gnss.answer import (
-    WITHOUT_FIX,
-    WITHOUT_RECORD,
     FixLoss,
     GnssReceiver,
     GnssReception,
@@ -73,8 +72,7 @@ def gnss(results: FlightResults) -> Section | None:
 
 def _claim(answer: GnssReception) -> Claim:
     main = answer.receiver
-    fixes = [one for one in main.states if one.state not in (*WITHOUT_FIX, *WITHOUT_RECORD)]
-    best = max(fixes, key=lambda one: one.share, default=None)
+    best = max(main.fixes, key=lambda one: one.share, default=None)
     value = "" if best is None else share_text(main.share_after_first_fix(best.state))
     remark = "" if best is None else name_of(best.state)
     told = [
@@ -115,15 +113,17 @@ def _states(answer: GnssReception) -> Grid:
     )
     rows = [
         (
-            *(one.topic, name_of(state.state), seconds_text(state.seconds), share_text(state.share)),
+            *(one.topic, name_of(state.state), seconds_text(state.seconds)),
+            ABSENT if state.state == UNLOGGED else share_text(state.share),
             *(number(state.spells, 0), seconds_text(state.longest_s)),
         )
         for one in answer.receivers
         for state in one.states
     ]
-    return Grid(
-        "States of the fix", heads, rows, "Shares are of time, from the first row to the last.", ("gnss_states",)
-    )
+    is_paused = any(one.not_logged_s for one in answer.receivers)
+    what = "the logged time" if is_paused else "time"
+    caption = f"Shares are of {what}, from the first row to the last."
+    return Grid("States of the fix", heads, rows, caption, ("gnss_states",))
 
 
 def _quality(answer: GnssReception) -> Grid:

@@ -19,7 +19,14 @@ from groundstation.systems.gnss.motion import Steps, steps_of
 from groundstation.systems.gnss.pairs import ComparedReceivers, compare
 from groundstation.systems.gnss.series import ReceiverRows, series_of
 from groundstation.systems.gnss.settings import GnssSettings
-from groundstation.systems.gnss.spells import Spells, losses_of, seconds_after_first_fix, spells_of, states_of
+from groundstation.systems.gnss.spells import (
+    Spells,
+    logged_s,
+    losses_of,
+    seconds_after_first_fix,
+    spells_of,
+    states_of,
+)
 from groundstation.systems.gnss.standstill import Stood, longest_of, standstills_of
 from groundstation.systems.gnss.texts import finding_of, has_heading_source, texts_of
 from groundstation.systems.gnss.wording_answer import never_had, sentence_of
@@ -185,7 +192,7 @@ def _one(
 
 
 def _share_with_fix(rows: ReceiverRows, spells: Spells) -> float:
-    whole_s = float(spells.seconds.sum())
+    whole_s = logged_s(spells)
     return float(rows.held_s[rows.has_fix].sum()) / whole_s if whole_s > 0.0 else float(rows.has_fix.mean())
 
 

@@ -87,7 +87,7 @@ def _fix(one: GnssReceiver, settings: GnssSettings) -> list[Judged]:
 def _lost(one: GnssReceiver, settings: GnssSettings) -> list[Judged]:
     losses = [loss for loss in one.losses if loss.state in WITHOUT_FIX]
     share = one.share_after_first_fix(*WITHOUT_FIX) if one.lost_s > 0.0 else 0.0
-    share = min(share, one.lost_s / max(one.end_s - (one.first_fix_s or 0.0), 1e-9))
+    share = min(share, one.lost_s / max(one.end_s - (one.first_fix_s or 0.0) - one.not_logged_s, 1e-9))
     if not losses and share <= settings.lost_share_warn:
         return []
     grade: Grade = "bad" if share > settings.lost_share_bad else "warn" if share > settings.lost_share_warn else "good"
@@ -107,7 +107,7 @@ def _silent(one: GnssReceiver, settings: GnssSettings) -> list[Judged]:
     if not gaps:
         return []
     seconds = sum(loss.seconds for loss in gaps)
-    share = seconds / max(one.end_s - one.start_s, 1e-9)
+    share = seconds / max(one.end_s - one.start_s - one.not_logged_s, 1e-9)
     longest = max(gaps, key=lambda loss: loss.seconds)
     times = f"{len(gaps)} times, {seconds_text(seconds)} in all" if len(gaps) > 1 else f"for {seconds_text(seconds)}"
     text = f"nothing recorded {times}{_speed(longest) if len(gaps) == 1 else ''}"

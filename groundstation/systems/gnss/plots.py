@@ -18,7 +18,7 @@ ROLES: dict[str, Role] = {
     **dict.fromkeys(("rtk_fixed", "ppp", "dgnss", "3d", "gnss_ins", "fix"), "good"),
     **dict.fromkeys(("rtk_float", "2d", "other", "dead_reckoning"), "warn"),
     **dict.fromkeys(("integrity_lost", "none"), "bad"),
-    **dict.fromkeys(("no_record", "log_silent"), "faint"),
+    **dict.fromkeys(("no_record", "log_silent", "not_logged"), "faint"),
 }
 ONE_ALONE = {  # axes that say which of two lines is there
     ("satellites", "used"): "satellites used",

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.gaps import logged_ns
 from groundstation.base.geodesy import SEMI_MAJOR_M, curvature_radii_m, on_earth
 from groundstation.base.nearest import nearest_rows
 from groundstation.base.records import BoolArray, Column
@@ -45,6 +46,10 @@ class ReceiverRows:
         Usual step, and the longest that is no gap; NaN and infinity of a single row.
     held_s : ndarray, shape (n,)
         Seconds that each row stands for.
+    paused_s : ndarray, shape (k, 2)
+        Pauses of the log between the first row and the last: from and to, flight seconds.
+    steps_s : ndarray, shape (n - 1,)
+        Logged seconds from each row to the next, pauses left out.
     hdop_of : str
         NMEA topic that the HDOP of the table comes from; empty where it is a field of its rows.
     """
@@ -62,6 +67,8 @@ class ReceiverRows:
     step_s: float
     gap_s: float
     held_s: FloatArray
+    paused_s: FloatArray
+    steps_s: FloatArray
     hdop_of: str = ""
 
     @property
@@ -95,8 +102,8 @@ class ReceiverRows:
 
     @property
     def is_gap(self) -> BoolArray:
-        """Tell behind which rows there is a gap, shape (n - 1,)."""
-        return np.diff(self.time_s) > self.gap_s
+        """Tell behind which rows there is a gap or a pause of the log, shape (n - 1,)."""
+        return (self.steps_s > self.gap_s) | (np.diff(self.time_s) > self.steps_s + 1e-6)
 
     @property
     def missed(self) -> int | None:
@@ -104,7 +111,7 @@ class ReceiverRows:
 
         None where the rate is not regular.
         """
-        steps = np.diff(self.time_s)
+        steps = self.steps_s
         if not len(steps) or np.mean(np.abs(steps - self.step_s) <= REGULAR_STEP * self.step_s) < REGULAR_SHARE:
             return None
         return int(np.maximum(np.round(steps / self.step_s) - 1.0, 0.0).sum())
@@ -117,13 +124,16 @@ def series_of(flight: Flight, topic: str, settings: GnssSettings) -> ReceiverRow
     """
     table, hdop_of = _with_hdop(flight, flight[topic].unique_times())
     time_s = flight.seconds(table.time_ns)
-    steps = np.diff(time_s)
+    steps = np.diff(flight.seconds(logged_ns(table.time_ns, flight.pauses)))
     step_s = float(np.median(steps)) if len(steps) else np.nan
     gap_s = largest_step_s(table.time_ns, settings.gap_steps, settings.gap_min_s)
     if len(steps):  # of rows that come in bursts
         gap_s = max(gap_s, BURSTS * float(np.quantile(steps, BURST_QUANTILE)))
     usual_s = step_s if np.isfinite(step_s) else 0.0
-    held_s = np.append(np.where(steps > gap_s, usual_s, steps), usual_s)
+    paused_s = flight.seconds(np.array(flight.pauses, dtype=np.int64).reshape(-1, 2))
+    paused_s = paused_s[(paused_s[:, 0] < time_s[-1]) & (paused_s[:, 1] > time_s[0])]
+    is_short = np.diff(time_s) <= steps + 1e-6  # no pause in it
+    held_s = np.append(np.where(is_short & (steps <= gap_s), steps, np.minimum(steps, usual_s)), usual_s)
     velocity = np.column_stack([table.values(f"velocity_{axis}_mps") for axis in ("north", "east", "down")])
     velocity[:, 2] *= -1.0
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
@@ -144,6 +154,8 @@ def series_of(flight: Flight, topic: str, settings: GnssSettings) -> ReceiverRow
         step_s,
         gap_s,
         held_s,
+        paused_s,
+        steps,
         hdop_of,
     )
 

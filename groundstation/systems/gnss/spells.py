@@ -6,12 +6,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray
-from groundstation.systems.gnss.answer import STATE_NAMES, WITHOUT_FIX, WITHOUT_RECORD, FixLoss, FixState
+from groundstation.systems.gnss.answer import (
+    NOT_LOGGED,
+    STATE_NAMES,
+    WITHOUT_FIX,
+    WITHOUT_RECORD,
+    FixLoss,
+    FixState,
+)
 from groundstation.systems.gnss.series import ReceiverRows
 from groundstation.systems.gnss.settings import GnssSettings
 
 LEAST_CLAIMS = 10  # rows with a claimed sigma that make its median
 NO_RECORD, LOG_SILENT = "no_record", "log_silent"
+MS = 1e-3  # s: pauses are known to it
 
 
 @dataclass(frozen=True)
@@ -32,32 +40,67 @@ def spells_of(one: ReceiverRows, others_s: FloatArray | None) -> Spells:
     """Return the spells of a receiver, gaps among them.
 
     ``others_s`` are the times of all rows of other sensors, sorted; a gap in which none of them has a row is one of the
-    log. None where the log has no other sensor.
+    log. None where the log has no other sensor. A pause of the log is none of the receiver; what it misses before and
+    behind is a gap where it is long enough.
     """
     gap = np.flatnonzero(one.is_gap)
-    silent = np.full(len(gap), NO_RECORD, dtype=one.state.dtype)
+    row, start_s, end_s, is_pause = _parts_of(one, gap)
+    silent = np.where(is_pause, NOT_LOGGED, NO_RECORD).astype(one.state.dtype)
     if others_s is not None:
-        middle = 0.1 * (one.time_s[gap + 1] - one.time_s[gap])
-        first = np.searchsorted(others_s, one.time_s[gap] + middle)
-        behind = np.searchsorted(others_s, one.time_s[gap + 1] - middle)
-        silent[first == behind] = LOG_SILENT
-    state = np.insert(one.state, gap + 1, silent)
-    start = np.insert(one.time_s, gap + 1, (one.time_s + one.held_s)[gap])
+        middle = 0.1 * (end_s - start_s)
+        first = np.searchsorted(others_s, start_s + middle)
+        behind = np.searchsorted(others_s, end_s - middle)
+        silent[(first == behind) & ~is_pause] = LOG_SILENT
+    # A gap begins when its row has held for its time; behind a pause it begins at once.
+    held_s = np.where(start_s == one.time_s[row], one.held_s[row], 0.0)
+    state = np.insert(one.state, row + 1, silent)
+    start = np.insert(one.time_s, row + 1, start_s + held_s)
     first = np.flatnonzero(np.append(True, state[1:] != state[:-1]))
     end = np.append(start[first[1:]], one.time_s[-1] + one.held_s[-1])
     return Spells(start[first], end, state[first])
 
 
+def _parts_of(
+    one: ReceiverRows, gap: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Return the parts of gaps: row before, from, to, and whether it is a pause of the log.
+
+    Parts beside a pause that are too short for a gap belong to the pause.
+    """
+    parts: list[tuple[int, float, float, bool]] = []
+    before = one.paused_s[:, 0]
+    for row in gap.tolist():
+        start_s, end_s = float(one.time_s[row]), float(one.time_s[row + 1])
+        inside = one.paused_s[(before >= start_s - MS) & (before < end_s)]
+        at_s = start_s
+        for from_s, to_s in inside.tolist():
+            if from_s - at_s > one.gap_s:
+                parts.append((row, at_s, from_s, False))
+                at_s = from_s
+            parts.append((row, at_s, to_s, True))
+            at_s = to_s
+        if not len(inside) or end_s - at_s > one.gap_s:
+            parts.append((row, at_s, end_s, False))
+    rows, starts, ends, pauses = zip(*parts, strict=True) if parts else ((), (), (), ())
+    return np.array(rows, dtype=np.intp), np.array(starts), np.array(ends), np.array(pauses, dtype=bool)
+
+
+def logged_s(spells: Spells) -> float:
+    """Return the time of all spells but pauses of the log."""
+    return float(spells.seconds[spells.state != NOT_LOGGED].sum())
+
+
 def states_of(one: ReceiverRows, spells: Spells) -> tuple[FixState, ...]:
     """Return the time in each state and the sigma claimed in it, the best state first."""
     claimed_m = one.values("horizontal_sigma_m")
-    whole_s = float(spells.seconds.sum())
+    whole_s = logged_s(spells)
     found = []
     for name in (*STATE_NAMES, *sorted(set(spells.state.tolist()) - STATE_NAMES.keys())):
         mine = spells.seconds[spells.state == name]
         if mine.size:
             seconds = float(mine.sum())
             share = seconds / whole_s if whole_s > 0.0 else float(np.mean(spells.state == name))
+            share = 0.0 if name == NOT_LOGGED else share
             sigmas = claimed_m[np.isfinite(claimed_m) & (one.state == name)]
             sigma_m = float(np.median(sigmas)) if len(sigmas) >= LEAST_CLAIMS else None
             found.append(FixState(name, seconds, share, int(mine.size), float(mine.max()), sigma_m))

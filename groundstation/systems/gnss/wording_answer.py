@@ -5,16 +5,16 @@ from itertools import pairwise
 
 from groundstation.base.words import never_a_fix
 from groundstation.systems.gnss.answer import (
+    NO_FIXES,
     STATE_NAMES,
     WITHOUT_FIX,
-    WITHOUT_RECORD,
     GnssReceiver,
     ReceiverTexts,
     StandstillScatter,
     VelocityAgainstPosition,
 )
 
-FIXED = frozenset(STATE_NAMES) - {*WITHOUT_FIX, *WITHOUT_RECORD}
+FIXED = frozenset(STATE_NAMES) - {*NO_FIXES}
 WHOLE = 0.9995  # share that is all
 STEP_TOLD = 0.5  # of the scatter: a coarser step of the logged places is told
 BY_ACCURACY = ("rtk_fixed", "rtk_float", "dgnss", "3d")  # kinds of fix whose order of accuracy is known

@@ -3,6 +3,7 @@
 import numpy as np
 import rerun.blueprint as rrb
 
+from groundstation.base.ledger import PauseEntry
 from groundstation.base.signals import topics_of_kind
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.quality import quality as quality_chapter
@@ -44,7 +45,7 @@ def quality(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.C
 
 
 def _coverage(recorder: Recorder, results: FlightResults) -> list[str]:
-    """Log one lane per topic: data from its first to its last sample, except in its gaps."""
+    """Log one lane per topic: data from first to last sample, except gaps and pauses."""
     ledger = results.rows_of(LedgerRows)
     if ledger is None:
         return []
@@ -55,21 +56,28 @@ def _coverage(recorder: Recorder, results: FlightResults) -> list[str]:
     for topic, part, first, last in rows:
         if not last > first:  # nothing, or a single sample: no stretch of time to draw
             continue
-        starts, ends, states = _spans(topic, float(first), float(last), gaps)
+        starts, ends, states = _spans(topic, float(first), float(last), gaps, results.ledger.pauses)
         path = f"coverage/{part}"
         recorder.spans(path, starts, ends, states, colours.DATA_STATES)
         paths.append(path)
     return paths
 
 
-def _spans(topic: str, first: float, last: float, gaps: GapRows | None) -> tuple[FloatArray, FloatArray, np.ndarray]:
-    begins, ends, states = [first], [], ["data"]
+def _spans(
+    topic: str, first: float, last: float, gaps: GapRows | None, pauses: tuple[PauseEntry, ...]
+) -> tuple[FloatArray, FloatArray, np.ndarray]:
+    holes = [(one.start_s, one.start_s + one.length_s, "not logged") for one in pauses if first < one.start_s < last]
     if gaps is not None:
         mine = gaps.topic == topic
-        for start, length in zip(gaps.start_s[mine], gaps.length_s[mine], strict=True):
-            ends += [float(start), float(start + length)]
-            begins += [float(start), float(start + length)]
-            states += ["gap", "data"]
+        holes += [
+            (float(start), float(start + length), "gap")
+            for start, length in zip(gaps.start_s[mine], gaps.length_s[mine], strict=True)
+        ]
+    begins, ends, states = [first], [], ["data"]
+    for start, end, state in sorted(holes):
+        ends += [start, end]
+        begins += [start, end]
+        states += [state, "data"]
     return np.array(begins), np.array([*ends, last]), np.array(states)
 
 
