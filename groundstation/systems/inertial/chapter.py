@@ -145,23 +145,22 @@ def _in_words(answer: InertialResult) -> str:
     if min(shares.values()) < CONSISTENT[0]:
         return f"{text}: the filter is overconfident, its sigmas are too small."
     if _is_inflated(answer.channels):
-        return _on_raised_noise(answer, text)
+        return _on_raised_noise(answer)
     is_close = max(shares.values()) <= CONSISTENT[1]
     return f"{text}: " + (
         "the filter is consistent." if is_close else "the filter is too careful, its sigmas are too large."
     )
 
 
-def _on_raised_noise(answer: InertialResult, seen: str) -> str:
+def _on_raised_noise(answer: InertialResult) -> str:
     """Return what it means that the filter takes GNSS for less certain than its noise."""
     size, time = (answer.settings.get(f"noise.gnss.position_{name}") for name in ("correlated_m", "correlation_s"))
     by = (
         f" (by {number(size, 1, 'm')}, over some {number(time, 0, 's')})" if is_number(size) and is_number(time) else ""
     )
     return (
-        f"Assumed: GNSS is wrong slowly too{by}, so the filter trusts each fix less than its noise alone would ask. "
-        f"Seen: {seen}, as that makes them. So this log does not test the σ of the filter; INS − GNSS itself does "
-        "not rest on it."
+        f"Assumed: GNSS is wrong slowly too{by}, so the filter trusts each fix less. Seen: innovations inside their "
+        "95 % band, as follows from that whatever the σ. So this log does not test the σ of the filter; INS − GNSS itself does not rest on it."
     )
 
 

@@ -76,8 +76,8 @@ def why_no_rate(answer: InertialResult) -> str:
     start = answer.navigation_start
     reason = "" if start is None else f" ({typeset(start.reason)})"
     return (
-        f"This is no drift rate: position error {growth(answer)}, and nothing shows when navigation began{reason}. "
-        "For a rate state nav_start_utc, in the aircraft file or in the head of the log."
+        f"No drift rate: position error {growth(answer)}; nothing shows when navigation began{reason}. For a rate "
+        "state nav_start_utc, in the aircraft file or in the head of the log."
     )
 
 
@@ -134,7 +134,7 @@ def forecast_claim(answer: ForecastResult, sentences: tuple[str, ...], tone: Ton
         DOUBTFUL if tone == "warn" else MEASURED,
         f"Forecast: 95 % within {value} after {lead} without GNSS{against}",
         value,
-        f"95 % of the errors after {lead} without GNSS{against}",
+        f"95 % after {lead} without GNSS, corrected{against}",
         sentences,
         ((f"Forecast, {lead}", value, f"95 %{against}"),),
     )

@@ -83,7 +83,7 @@ def test_drift_and_error_after_an_hour_stand_on_the_front(tmp_path: Path) -> Non
     ours, raw = told_by[forecast_result().default_method], told_by["raw_ins"]
     assert tile.claim.value.replace("\u202f", " ") == f"{ours:.0f} m"
     remark = tile.claim.remark.replace("\u202f", " ")
-    assert remark == f"95 % of the errors after 60 min without GNSS; raw INS {raw:.0f} m"
+    assert remark == f"95 % after 60 min without GNSS, corrected; raw INS {raw:.0f} m"
 
 
 def test_of_an_aided_ins_differences_and_its_own_filter_are_drawn() -> None:
