@@ -160,7 +160,8 @@ def _on_raised_noise(answer: InertialResult) -> str:
     )
     return (
         f"Assumed: GNSS is wrong slowly too{by}, so the filter trusts each fix less. Seen: innovations inside their "
-        "95 % band, as follows from that whatever the σ. So this log does not test the σ of the filter; INS − GNSS itself does not rest on it."
+        "95 % band, as follows from that whatever the σ. So this log does not test the σ of the filter; INS − GNSS "
+        "itself does not rest on it."
     )
 
 
