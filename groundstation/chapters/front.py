@@ -48,7 +48,7 @@ def front(results: FlightResults, chapters: Chapters, answers: Sequence[Section]
 
 
 def note_of_log(results: FlightResults) -> str:
-    """Return what the head of the log says of how it was made, in a line; empty where it says nothing."""
+    """Return what the head of the log says of how it was made, in a line; else nothing."""
     texts = {key.lower(): clean(text).strip() for key, text in results.metadata.items()}
     told = ""
     for text in filter(None, (texts.get(key, "") for key in NOTES)):

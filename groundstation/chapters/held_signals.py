@@ -34,7 +34,7 @@ LEFT = "logged, but with no usable value where it is needed"
 
 
 def is_held(results: FlightResults, text: str) -> bool:
-    """Tell whether the log has values of what a piece of advice asks for; False for what no rule names."""
+    """Tell whether the log has what advice asks for; False for what no rule names."""
     held = {
         f"{kind_of(topic)}.{name}"
         for topic, one in results.ledger.topics.items()

@@ -124,7 +124,9 @@ def line_of(outcome: Outcome, most: int | None = LONGEST) -> str:
 
 
 def shortened(text: str, most: int | None) -> str:
-    """Return text of at most so many characters: cut behind a clause, with the brackets that fit.
+    """Return text of at most so many characters, cut behind a clause.
+
+    It keeps the brackets that fit.
 
     Examples
     --------

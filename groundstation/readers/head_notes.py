@@ -14,7 +14,7 @@ _PARTS = re.compile(r"[,;\t]")
 
 
 def is_entry(key: str) -> bool:
-    """Tell whether what stands before a colon is a key of metadata, and no beginning of a sentence.
+    """Tell whether text before a colon is a key, and no beginning of a sentence.
 
     Examples
     --------

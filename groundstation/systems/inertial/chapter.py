@@ -136,7 +136,7 @@ def _is_consistent(channels: Channels) -> bool:
 
 
 def _in_words(answer: InertialResult) -> str:
-    """Return whether the sigmas of the filter can be trusted: what it assumed, what shows, what follows."""
+    """Return whether the sigmas of the filter can be trusted."""
     shares = _shares(answer.channels)
     if not shares:
         return ""

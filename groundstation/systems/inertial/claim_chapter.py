@@ -63,7 +63,7 @@ def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -
 
 
 def growth_headline(answer: InertialResult) -> str:
-    """Return how the position error grew within a log that does not show when navigation began."""
+    """Return how the position error grew, where no start of navigation is known."""
     rate = growth_nmiph(answer)
     if rate is None:
         return "INS errors measured, start of navigation not known"
@@ -118,7 +118,7 @@ def growth(answer: InertialResult) -> str:
 
 
 def forecast_claim(answer: ForecastResult, sentences: tuple[str, ...], tone: Tone) -> Claim | None:
-    """Return what 95 % of the errors stay within after an hour without GNSS; None without an error.
+    """Return what 95 % of the errors stay within after an hour; None without an error.
 
     The raw INS stands beside the default method: the difference is what the estimator buys. The horizon is the longest
     up to an hour, or the shortest where all are longer.

@@ -51,7 +51,7 @@ def _gain(answer: ForecastResult) -> Note | None:
 
 
 def _early(answer: ForecastResult, length_s: float) -> str:
-    """Return the error of such outages that begin before those of the skill; empty without any."""
+    """Return the error of such outages that begin earlier; empty without any."""
     early = [row for row in answer.phases if row.is_early and row.length_s == length_s]
     if not early:
         return ""
