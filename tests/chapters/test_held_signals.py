@@ -83,7 +83,7 @@ def test_a_log_in_the_air_with_weight_on_wheels_is_asked_for_its_ground_run() ->
     without = told(holding("gnss.gdop", not_assessable=missing))
     assert without["Record"] == "For the heading correction: weight on wheels."
     with_it = told(holding("discrete.weight_on_wheels", not_assessable=missing))
-    assert with_it["Record"].endswith("from the stand on: by weight on wheels this log holds no ground run.")
+    assert with_it["Record"].endswith(": the ground run too (by weight on wheels this log holds none).")
 
 
 def test_a_gate_of_a_signal_that_is_there_asks_to_check_it() -> None:

@@ -13,7 +13,7 @@ from groundstation.systems.heading.gates_answer import GATES
 
 PURPOSE = "heading correction"
 WHEELS = "weight on wheels"
-FROM_THE_STAND = "from the stand on: by weight on wheels this log holds no ground run"
+FROM_THE_STAND = "the ground run too (by weight on wheels this log holds none)"
 STANDSTILL_S = 30.0
 NO_GROUND_RUN = ("ground speed never above", "no straight taxi", NO_CONTACT)
 WHAT_IT_NEEDS = (
