@@ -4,6 +4,7 @@ Of a plan: what is planned, and what its chapters say above all.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from groundstation.base.failures import attempt
 from groundstation.base.findings import worst
@@ -11,11 +12,14 @@ from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.chapters.assessed import not_assessed
 from groundstation.chapters.by_answer import answer_chapters, loss_above
 from groundstation.chapters.chapter import Chapter, Chapters, Pairs
+from groundstation.chapters.grades import legend
 from groundstation.chapters.parts import Cell, Facts, Front, Mark, Note, Section, Tile
-from groundstation.chapters.wording import ABSENT, clock, is_number, typeset
+from groundstation.chapters.wording import ABSENT, clean, clock, is_number, typeset
 from groundstation.results.flight import FlightResults, Status
 from groundstation.results.recorded import recorded
 
+NOTES = ("note", "notes", "comment", "comments", "remark", "remarks")  # keys of what the head of a log says of itself
+LONGEST_NOTE = 240
 HOUR_S = 3599.5  # rounds to an hour
 STATUS: dict[Status, Mark] = {
     "ok": Mark("good", "ok"),
@@ -38,6 +42,21 @@ def front(results: FlightResults, chapters: Chapters, answers: Sequence[Section]
 
     ``answers`` are the chapters on the answers of a flight where they are built already.
     """
+    top = _front(results, chapters, answers)
+    words = legend(top.verdict, (tile.claim for tile in top.others))
+    return replace(top, note=note_of_log(results), legend=words)
+
+
+def note_of_log(results: FlightResults) -> str:
+    """Return what the head of the log says of how it was made, in a line; else nothing."""
+    texts = {key.lower(): clean(text).strip() for key, text in results.metadata.items()}
+    told = ""
+    for text in filter(None, (texts.get(key, "") for key in NOTES)):
+        told = told if text in told else "; ".join(filter(None, (told, text)))
+    return told if len(told) <= LONGEST_NOTE else f"{told[: LONGEST_NOTE - 4].rpartition(' ')[0]} ..."
+
+
+def _front(results: FlightResults, chapters: Chapters, answers: Sequence[Section] | None) -> Front:
     if results.is_plan:
         return plan_front(results, _pairs_of_plan(results), chapters.plan)
     names = [results.metadata.get(key, "") for key in ("aircraft", "flight")]

@@ -83,6 +83,8 @@ def front_markdown(front: Front) -> str:
         parts.append(f"## {escaped(front.line)}")  # before the rest: a small panel shows it without scrolling
     if front.recorded:
         parts.append(escaped(front.recorded))
+    if front.note:
+        parts.append(escaped(f"Note of the log: {front.note}"))
     if front.others:
         rows = [(front.subject, front.line), *((tile.title, tile.claim.line) for tile in front.others)]
         parts.append(table(("Answer", "Found"), [(escaped(title), escaped(line)) for title, line in rows]))
@@ -93,6 +95,7 @@ def front_markdown(front: Front) -> str:
     if front.missing:
         parts.append("## Not assessable")
         parts += [f"**{escaped(subject)}**: {escaped(reason)}" for subject, reason in front.missing]
+    parts += [escaped(f"{mark.symbol} {mark.text}: {meaning}".strip()) for mark, meaning in front.legend]
     return "\n\n".join(parts)
 
 

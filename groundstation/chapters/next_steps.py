@@ -1,13 +1,14 @@
 """Chapter on what to fly, record and check next time.
 
 It covers every answer that this flight could not give or not decide. Systems say what helps them; what helps any of
-them stands here.
+them stands here. A signal that the log has is not asked for.
 """
 
 from collections.abc import Iterator
 
 from groundstation.base.words import listed
 from groundstation.chapters.chapter import Advice, Chapters, Remedies
+from groundstation.chapters.held_signals import without_held
 from groundstation.chapters.parts import Facts, Section
 from groundstation.results.flight import FlightResults
 
@@ -35,7 +36,7 @@ def next_steps(results: FlightResults, chapters: Chapters) -> Section | None:
     lines: dict[str, dict[str, list[str]]] = {line: {} for line in LINES}
     withheld = [word for one in chapters.advisers for word in one.withheld(results)]
     danger = ""
-    for line, text, purpose, _, is_danger in _advice(results, chapters):
+    for line, text, purpose, _, is_danger in (without_held(one, results) for one in _advice(results, chapters)):
         if any(word in text for word in withheld):
             continue
         danger = danger or (line if is_danger else "")

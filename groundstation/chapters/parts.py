@@ -245,6 +245,10 @@ class Front:
         The other answers.
     missing : sequence of (str, str)
         Subject and reason of what could not be assessed, a folded line each.
+    note : str
+        What the head of the log says of how it was made.
+    legend : sequence of (Mark, str)
+        The words that the answers are graded by, and what each means.
     """
 
     title: str
@@ -259,6 +263,8 @@ class Front:
     others: Sequence[Tile] = ()
     missing: Sequence[tuple[str, str]] = ()
     recorded: str = ""
+    note: str = ""
+    legend: Sequence[tuple[Mark, str]] = ()
 
     @property
     def line(self) -> str:

@@ -14,10 +14,10 @@ LONGEST = 160  # characters of a line behind the name of the log
 STATES: Mapping[State, str] = {"data_lost": "data lost", "limit_reached": "at the limit", "incomplete": "incomplete"}
 GRADES: Mapping[str, str] = {
     **dict.fromkeys(("accept", "accepted", "pass", "good", "agree", "stabilised", "healthy", "consistent"), "green"),
-    **dict.fromkeys(("measured", "joined", "told"), "green"),
+    **dict.fromkeys(("measured", "joined"), "green"),
     **dict.fromkeys(("reject", "refused", "fail", "failed", "bad", "wrong", "off", "not", "left GNSS"), "red"),
     **dict.fromkeys(("data lost", "moved while aligning"), "red"),
-    **dict.fromkeys(("doubtful", "undecided", "ambiguous", "warn", "warning", "warnings", "filter wrong"), "yellow"),
+    **dict.fromkeys(("doubtful", "undecided", "ambiguous", "warn", "warnings", "filter wrong"), "yellow"),
     **dict.fromkeys(("advisory", "extend", "too sure", "not stabilised", "they differ", "it or another"), "yellow"),
 }
 _BESIDE = re.compile(r" \([^()]*\)")
@@ -124,23 +124,36 @@ def line_of(outcome: Outcome, most: int | None = LONGEST) -> str:
 
 
 def shortened(text: str, most: int | None) -> str:
-    """Return text of at most so many characters: without brackets, then cut behind a clause.
+    """Return text of at most so many characters, cut behind a clause.
+
+    It keeps the brackets that fit.
 
     Examples
     --------
     >>> shortened("error +0.9 deg (+0.8 with sideslip), enter -0.9 deg; 16 satellites", 40)
     'error +0.9 deg, enter -0.9 deg ...'
+    >>> shortened("no rate (state a start): INS 3 nmi (raw INS 5 nmi)", 40)
+    'no rate (state a start): INS 3 nmi'
     >>> shortened("abcdefgh", 6), shortened("ab", 6)
     ('ab ...', 'ab')
     """
     if most is None or len(text) <= most:
         return text
-    text = _BESIDE.sub("", text)
-    if len(text) <= most:
-        return text
-    room = max(0, most - len(" ..."))
-    end = next((place for mark in ("; ", ", ", " ") if (place := text.rfind(mark, room // 2, room + 1)) > 0), room)
-    return f"{text[:end]} ..."
+    bare, end, tail = _BESIDE.sub("", text), len(text), ""
+    if len(bare) > most:
+        tail, room = " ...", max(0, most - len(" ..."))
+        end = next((place for mark in ("; ", ", ", " ") if (place := bare.rfind(mark, room // 2, room + 1)) > 0), room)
+    bare = bare[:end]
+    room, told, before = most - len(bare) - len(tail), "", 0
+    for beside in _BESIDE.finditer(text):
+        plain = text[before : beside.start()]
+        if len(plain) > len(bare):
+            break
+        fits = len(beside.group()) <= room
+        told += plain + beside.group() * fits
+        room -= len(beside.group()) * fits
+        bare, before = bare[len(plain) :], beside.end()
+    return f"{told}{bare}{tail}"
 
 
 def tell_errors(outcome: Outcome, *, with_traces: bool = False) -> None:

@@ -29,6 +29,7 @@ from groundstation.readers.dialect import (
     trailing_cells,
     uses_decimal_comma,
 )
+from groundstation.readers.head_notes import NOTE, is_entry, note_of
 from groundstation.readers.layout import Derivation, LayoutRule, TableLayout, TimeRule, rule_for
 from groundstation.readers.misnamed import misnamed
 from groundstation.readers.sections import (
@@ -117,11 +118,12 @@ def _read_top(source: Source) -> _Top | None:
     for at, line in enumerate(lines):
         if line.text.startswith("#"):
             key, colon, value = line.text.lstrip("#").partition(":")
-            if colon and key.strip():
+            if colon and is_entry(key):
                 metadata[key.strip()] = value.strip()
         elif line.text.strip():
             if first is None or any(name in line.text for name in TIME_COLUMNS):
-                top = _top(encoding, metadata, lines, at, strange_lines)
+                note = note_of(one.text for one in lines[:at])
+                top = _top(encoding, metadata | ({NOTE: note} if note else {}), lines, at, strange_lines)
                 if top.is_flat and (first is None or (top.canonical and top.has_rows)):
                     return top
                 first = first or top

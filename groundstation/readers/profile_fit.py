@@ -16,6 +16,7 @@ from groundstation.readers.dialect import (
     split_cells,
     trailing_cells,
 )
+from groundstation.readers.head_notes import NOTE, note_of
 from groundstation.readers.profile import Profile
 from groundstation.readers.sections import HeaderPlace, lines_below
 from groundstation.readers.source import Source
@@ -94,6 +95,8 @@ class Fit:
             told = (*self.profile.find, *self.profile.find_in_name, *self.profile.constants)
             names = {name: found.get(name, "") for name in told}
             found[key] = " ".join(template.format(**names).split())
+        note = note_of(line.text for line in self.above)
+        found = {NOTE: note} | found if note else found
         units = units_entry(self.units)
         return found | {PREFIX + self.profile.raw_topic: units} if units else found
 

@@ -21,9 +21,9 @@ OPENS = {
     "ulog/px4_rs_esc_status.ulg": ("warn", "Warnings", "Vibration raised 0:12", "40 s of GNSS"),
     "ulog/quadrotor_local.ulg": ("bad", "Failed", "“Low battery” at 1:19", "never a fix"),
     "ulog/sample_px4_events.ulg": ("good", "Healthy", "GNSS good, filter healthy", "nothing lost"),
-    "gnss/walk_0827_gnss_1730_sf.pos": ("warn", "Warning", "RTK fixed 65 %", "GNSS (RTK fixed 65 %) at 4 Hz"),
+    "gnss/walk_0827_gnss_1730_sf.pos": ("warn", "Warnings", "RTK fixed 65 %", "GNSS (RTK fixed 65 %) at 4 Hz"),
     "gnss/drive_0708_gnss_1934_sf.pos": ("good", "Good", "RTK fixed 99.6 %", "9:09 min of GNSS"),
-    "g1000/log_220416_161856_LFQA.csv": ("warn", "Warning", "Position jumps once", "3:12 min of GNSS, attitude"),
+    "g1000/log_220416_161856_LFQA.csv": ("warn", "Warnings", "Position jumps once", "3:12 min of GNSS, attitude"),
     "foreign/robot_localization_jackal_test2.bag": ("plain", "Recorded", "61 s of attitude, odometry and IMU", ""),
     "ch10/kc135_429_1553_1MB.c10": ("warn", "Recorded", "Messages without navigation", ""),
     "ulog/Proto_FLT09_REENCODED_fixedwing.ulg": ("bad", "Left GNSS", "INS and GNSS up to 85.1 m", "8:50 min of GNSS"),
@@ -31,10 +31,10 @@ OPENS = {
     "ulog/px4_rs_6ba1abc7.ulg": ("bad", "Failed", "Magnetic field wrong throughout", "26 s of GNSS"),
     "dataflash/TestLog2_REENCODED_plane.BIN": ("warn", "Warnings", "Setpoints followed poorly", "nothing lost"),
     "tlog/uavlogviewer_vtol.tlog": ("warn", "Warnings", "Sensor or estimator switched at 0:30", "RTK fixed"),
-    "gnss/walk_0827_gnss_1730.ubx": ("warn", "Warning", "RTK fixed 65 %", "2:14 min of GNSS"),
+    "gnss/walk_0827_gnss_1730.ubx": ("warn", "Warnings", "RTK fixed 65 %", "2:14 min of GNSS"),
     "gnss/rtklib_demo1_out.pos": (
         "warn",
-        "Warning",
+        "Warnings",
         "position scatters by 1.0 m at standstill where 5.9 cm is claimed",
         "RTK fixed 72 %",
     ),
@@ -50,7 +50,7 @@ OPENS = {
         "3:43:59 h",
     ),
     "foreign/robot_localization_husky_test1.bag": ("good", "Good", "DGNSS throughout", "6:35 min of GNSS"),
-    "inertial/gv_ff02.csv": ("good", "Measured", "5773", "5:04:34 h of GNSS and INS at 1 Hz"),
+    "inertial/gv_ff02.csv": ("unknown", "No rate", "grew at 0.61", "5:04:34 h of GNSS and INS at 1 Hz"),
 }
 
 

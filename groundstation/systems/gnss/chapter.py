@@ -32,7 +32,7 @@ TITLE = "GNSS reception"
 LEAD = "What the receiver had over time, how good it was, and where it was lost."
 MARKS: dict[Grade, Mark] = {
     "good": Mark("good", "Good"),
-    "warn": Mark("warn", "Warning"),
+    "warn": Mark("warn", "Warnings"),
     "bad": Mark("bad", "Bad"),
     "unknown": Mark("unknown", "Not judged"),
 }

@@ -2,7 +2,9 @@
 
 from collections.abc import Iterator
 
+from groundstation.chapters.assessed import reason_of
 from groundstation.chapters.chapter import Advice, Remedies
+from groundstation.chapters.held_signals import is_held
 from groundstation.chapters.wording import number, significant
 from groundstation.results.flight import FlightResults
 from groundstation.results.gates import NO_CONTACT, Gate, in_plain_words
@@ -10,6 +12,8 @@ from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.gates_answer import GATES
 
 PURPOSE = "heading correction"
+WHEELS = "weight on wheels"
+FROM_THE_STAND = "the ground run too (by weight on wheels this log holds none)"
 STANDSTILL_S = 30.0
 NO_GROUND_RUN = ("ground speed never above", "no straight taxi", NO_CONTACT)
 WHAT_IT_NEEDS = (
@@ -28,7 +32,6 @@ def remedies(taxi_speed_min_mps: float, taxi_min_s: float) -> Remedies:
         ("ground speed never above", ("Fly", taxi)),
         ("needed for an estimate", ("Fly", taxi)),
         ("no straight taxi", ("Fly", taxi)),
-        ("ground contact proven", ("Record", "weight on wheels")),
     )
 
 
@@ -36,6 +39,8 @@ def advise(results: FlightResults) -> Iterator[Advice]:
     """Yield what helps against each gate that keeps the number from being typed."""
     answer = results.answer(HeadingResult)
     if answer is None:
+        if NO_CONTACT in reason_of(results, HeadingResult.analysis):
+            yield Advice("Record", FROM_THE_STAND if is_held(results, WHEELS) else WHEELS, PURPOSE)
         return
     standstill = f"{answer.setting('standstill_max_s', STANDSTILL_S):g} s"
     for gate in answer.gates:

@@ -54,10 +54,10 @@ def _claim(answer: InertialResult, headline: str, judged: JudgedFilter | None) -
     if left is not None:
         return _claim_on(answer, left, headline)
     if judged is not None:
-        word = "Judged" if judged.worst is None else "Wrong"
+        word = "Measured" if judged.worst is None else "Filter wrong"
         mark = Mark("good" if judged.worst is None else "warn", word)
         return Claim(Rank.INERTIAL_OPEN, mark, headline, value, remark, sentences, (*figures, *_sizes_told(judged)))
-    word = "Aided" if answer.kind == "gnss_aided" else "Open"
+    word = "Aided" if answer.kind == "gnss_aided" else "Undecided"
     return Claim(Rank.INERTIAL_OPEN, Mark("unknown", word), headline, value, remark, sentences, figures)
 
 

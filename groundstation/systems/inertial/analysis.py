@@ -13,6 +13,7 @@ from groundstation.systems.analysis import Analysis, Found, RestsOn, Shortfall, 
 from groundstation.systems.inertial.answer import InertialResult
 from groundstation.systems.inertial.cause_answer import CausesResult
 from groundstation.systems.inertial.columns import CAUSES_COLUMNS, FORECAST_COLUMNS, INERTIAL_COLUMNS, UNITS_COLUMNS
+from groundstation.systems.inertial.drift_answer import sentence as unaided_sentence
 from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.systems.inertial.judged_answer import judged_filter
 from groundstation.systems.inertial.settings import InertialSettings
@@ -156,7 +157,7 @@ def _is_forecast_expected(_flight: "Flight", known: Known) -> bool:
 
 
 def _sentence(answers: Answers) -> str:
-    inertial, forecast = answer_of(answers, InertialResult), answer_of(answers, ForecastResult)
+    inertial = answer_of(answers, InertialResult)
     if inertial is None:
         return ""
     if inertial.kind != "unaided":
@@ -169,25 +170,7 @@ def _sentence(answers: Answers) -> str:
             of, told = inertial.filter_of_ins, "" if judged is None else f"; {judged.sentence}"
             return f"{of.title} and GNSS {left.apart}apart for {left.end_s - left.start_s:.0f} s{of.use}{told}"
         return f"{says}{within}{': no errors, no forecast' if judged is None else f'; {judged.sentence}'}"
-    parts = []
-    if inertial.radial_error_rate_fit_nmiph is not None:
-        parts.append(f"{inertial.radial_error_rate_fit_nmiph:.2f} nmi/h")
-    elif inertial.navigation_start is not None and inertial.navigation_start.time_s is None:
-        parts.append(_growth(inertial))
-    if forecast is not None:
-        shipped = [row for row in forecast.skill if row.method == forecast.default_method]
-        longest = max(shipped, key=lambda row: row.horizon_min, default=None)
-        if longest is not None:
-            parts.append(f"forecast {longest.rms_m:.0f} m after {longest.horizon_min:g} min")
-    return f"INS {', '.join(parts)}" if parts else "INS errors estimated"
-
-
-def _growth(inertial: InertialResult) -> str:
-    """Return the position error at the ends of a log that does not show when navigation began."""
-    first, last, hours = inertial.radial_error_first_m, inertial.radial_error_last_m, inertial.compared_hours
-    if first is None or last is None or hours is None:
-        return "no rate: start of navigation not known"
-    return f"error {first:.0f} m at first, {last:.0f} m after {60.0 * hours:.0f} min"
+    return unaided_sentence(answers)
 
 
 def _is_main_of_forecast(path: str, saved: tuple[Mapping[str, Any], ...]) -> bool:

@@ -230,7 +230,7 @@ class InertialResult(Answer, KindOfIns, AzimuthByTurns, BestTrack, ErrorsAlongTh
         The time-position fit of the same error, the figure of the acceptance: slope through the origin by least
         squares over all epochs since navigation began. None where the median is.
     largest_radial_error_m, largest_radial_error_at_s : float or None
-        Largest radial position error, and its flight time.
+        Largest radial position error, and its flight time; ``largest_radial_error_utc`` that in UTC, if known.
     navigation_start : NavigationStart or None
         When navigation began; None of an INS that GNSS corrects.
     radial_error_first_m, radial_error_last_m : float or None
@@ -277,6 +277,7 @@ class InertialResult(Answer, KindOfIns, AzimuthByTurns, BestTrack, ErrorsAlongTh
     velocity_error_rms_mps: float | None = None
     largest_radial_error_m: float | None = None
     largest_radial_error_at_s: float | None = None
+    largest_radial_error_utc: str = ""
     navigation_start: NavigationStart | None = None
     radial_error_first_m: float | None = None
     radial_error_last_m: float | None = None

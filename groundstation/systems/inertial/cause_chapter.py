@@ -77,7 +77,7 @@ def _top(answer: CausesResult) -> CauseShare:
 def _claim(answer: CausesResult, headline: str) -> Claim:
     """Return the claim: good where one cause surely has half of the error."""
     share = _top(answer).share
-    mark = Mark("good", "Told") if share.low95 > HALF else Mark("unknown", "Not sure")
+    mark = Mark("good", "Measured") if share.low95 > HALF else Mark("unknown", "Undecided")
     value = number(100.0 * share.value, 0, "%")
     return Claim(Rank.FORECAST, mark, headline, value, WORDS[_top(answer).name], (f"{typeset(answer.sentence)}.",))
 

@@ -33,11 +33,13 @@ from groundstation.systems.inertial.answer import (
 from groundstation.systems.inertial.claim_chapter import (
     drift_of,
     growth,
+    growth_headline,
     inertial_claim,
-    is_start_unknown,
     largest_of,
     lead_of,
+    why_no_rate,
 )
+from groundstation.systems.inertial.drift_answer import is_start_unknown
 
 NOISE = "noise."  # what begins the names of those settings that the class gives
 PLACES = {"m": 1, "mps": 3, "arcsec": 1, "dph": 4, "dphph": 4}
@@ -75,7 +77,7 @@ def _unaided(answer: InertialResult) -> Section:
         *_settings(answer.settings),
     )
     is_doubtful = bool(_shares(answer.channels)) and min(_shares(answer.channels).values()) < CONSISTENT[0]
-    told = inertial_claim(answer, _in_words(answer.channels), is_doubtful=is_doubtful)
+    told = inertial_claim(answer, _in_words(answer), is_doubtful=is_doubtful)
     return Section("inertial", TITLE, LEAD, kept(parts), _headline(answer), claim=told, appendix=kept(workings))
 
 
@@ -108,14 +110,11 @@ def _quality(answer: InertialResult) -> Note:
     rate = f" of {number(drift, 2, 'nmi/h')} ({measure})" if is_number(drift) else ""
     velocity = number(answer.velocity_error_rms_mps, 2, "m/s")
     largest = number(answer.largest_radial_error_m, 0, "m")
-    in_words = _in_words(answer.channels)
-    text = f"An unaided INS{rate}: velocity error {velocity} RMS, position error up to {largest}. {in_words}"
-    if is_start_unknown(answer) and answer.navigation_start is not None:
-        text += (
-            f" No rate is stated: nothing shows when navigation began ({answer.navigation_start.reason}). Position "
-            f"error {growth(answer)}. Where the start is known, state it: nav_start_utc in the aircraft file."
-        )
-    tone: Tone = "plain" if _is_inflated(answer.channels) else "good"  # raised noise proves nothing
+    text = f"An unaided INS{rate}: velocity error {velocity} RMS, position error up to {largest}. {_in_words(answer)}"
+    if is_start_unknown(answer):
+        text += f" {growth_headline(answer)}. {why_no_rate(answer)}"
+    is_proven = is_number(drift) and not _is_inflated(answer.channels)  # raised noise proves nothing
+    tone: Tone = "good" if is_proven else "plain"
     return Note(text.strip(), tone if _is_consistent(answer.channels) else "warn")
 
 
@@ -136,22 +135,33 @@ def _is_consistent(channels: Channels) -> bool:
     return bool(shares) and all(CONSISTENT[0] <= share <= highest for share in shares.values())
 
 
-def _in_words(channels: Channels) -> str:
-    shares = _shares(channels)
+def _in_words(answer: InertialResult) -> str:
+    """Return whether the sigmas of the filter can be trusted."""
+    shares = _shares(answer.channels)
     if not shares:
         return ""
     told = " and ".join(f"{number(100.0 * share, 1, '%')} ({name})" for name, share in shares.items())
     text = f"{told} of the innovations lie inside their 95 % band"
     if min(shares.values()) < CONSISTENT[0]:
         return f"{text}: the filter is overconfident, its sigmas are too small."
-    if _is_inflated(channels):
-        return (
-            "The GNSS noise was raised to cover slow errors, so innovations cannot show whether the filter is "
-            "consistent."
-        )
+    if _is_inflated(answer.channels):
+        return _on_raised_noise(answer)
     is_close = max(shares.values()) <= CONSISTENT[1]
     return f"{text}: " + (
         "the filter is consistent." if is_close else "the filter is too careful, its sigmas are too large."
+    )
+
+
+def _on_raised_noise(answer: InertialResult) -> str:
+    """Return what it means that the filter takes GNSS for less certain than its noise."""
+    size, time = (answer.settings.get(f"noise.gnss.position_{name}") for name in ("correlated_m", "correlation_s"))
+    by = (
+        f" (by {number(size, 1, 'm')}, over some {number(time, 0, 's')})" if is_number(size) and is_number(time) else ""
+    )
+    return (
+        f"Assumed: GNSS is wrong slowly too{by}, so the filter trusts each fix less. Seen: innovations inside their "
+        "95 % band, as follows from that whatever the σ. So this log does not test the σ of the filter; INS − GNSS "
+        "itself does not rest on it."
     )
 
 

@@ -8,13 +8,18 @@ from collections.abc import Iterator
 from groundstation.base.units import M_PER_NAUTICAL_MILE
 from groundstation.chapters.chapter import Advice
 from groundstation.chapters.parts import Claim, Mark, Rank, Tone
-from groundstation.chapters.wording import ABSENT, clock, is_number, number
+from groundstation.chapters.wording import ABSENT, clock, is_number, number, typeset
 from groundstation.results.flight import FlightResults
 from groundstation.systems.inertial.answer import InertialResult
-from groundstation.systems.inertial.forecast_answer import ForecastResult, SkillRow
+from groundstation.systems.inertial.drift_answer import (
+    growth_nmiph,
+    is_start_stated,
+    is_start_unknown,
+    judged_outage,
+)
+from groundstation.systems.inertial.forecast_answer import ForecastResult
 
-WORDS: dict[Tone, str] = {"good": "Measured", "warn": "With care", "unknown": "Open"}
-HOUR_MIN = 60.0  # the horizon a forecast is judged by at a glance, or the longest below it
+MEASURED, DOUBTFUL, NO_RATE = Mark("good", "Measured"), Mark("warn", "Doubtful"), Mark("unknown", "No rate")
 PURPOSE = "INS errors"
 
 
@@ -22,32 +27,57 @@ def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -
     """Return the drift of an INS that GNSS does not correct.
 
     ``quality`` says in a sentence whether the filter can be trusted; ``is_doubtful`` that its sigmas are too small.
+    Without a rate nothing is judged: the claim is open.
     """
     rate, measure = drift_of(answer)
     drift = number(rate, 2, "nmi/h")
+    sentences = (quality,) if quality else ()
+    mark = NO_RATE
     if is_number(rate):
-        is_stated = answer.navigation_start is not None and answer.navigation_start.basis == "stated"
         headline = f"Unaided INS, drifts {drift}"
-        remark = f"{measure}; start of navigation as you stated it" if is_stated else measure
+        start = answer.navigation_start
+        remark = measure
+        if start is not None and is_start_stated(answer):
+            remark = f"{measure}; start of navigation as stated: {start.reason}"
+        mark = DOUBTFUL if is_doubtful else MEASURED
     elif is_start_unknown(answer):
-        headline = f"INS error {growth(answer)}"
+        headline = growth_headline(answer)
         remark = "no rate: nothing shows when navigation began"
+        sentences = (why_no_rate(answer), *sentences)
     else:
         headline, remark = "INS errors measured, flight too short for a drift", ""
     found = (
-        ("INS drift", drift, measure),
+        ("INS drift", drift, remark),
         ("Velocity error", number(answer.velocity_error_rms_mps, 2, "m/s"), "RMS"),
         ("Largest position error", *largest_of(answer)),
     )
-    tone: Tone = "warn" if is_doubtful else "good"
     return Claim(
         Rank.INERTIAL,
-        Mark(tone, WORDS[tone]),
+        mark,
         headline,
         value=drift if is_number(rate) else "",
         remark=remark,
-        sentences=(quality,) if quality else (),
-        figures=tuple(figure for figure in found if figure[1] != "—"),
+        sentences=sentences,
+        figures=tuple(figure for figure in found if figure[1] != ABSENT),
+    )
+
+
+def growth_headline(answer: InertialResult) -> str:
+    """Return how the position error grew, where no start of navigation is known."""
+    rate = growth_nmiph(answer)
+    if rate is None:
+        return "INS errors measured, start of navigation not known"
+    verb = "grew" if rate >= 0.0 else "fell"
+    return f"INS error {verb} at {number(abs(rate), 2, 'nmi/h')} within the log"
+
+
+def why_no_rate(answer: InertialResult) -> str:
+    """Return why that growth is no drift rate, and what to state for one."""
+    start = answer.navigation_start
+    reason = "" if start is None else f" ({typeset(start.reason)})"
+    return (
+        f"No drift rate: position error {growth(answer)}; nothing shows when navigation began{reason}. For a rate "
+        "state nav_start_utc, in the aircraft file or in the head of the log."
     )
 
 
@@ -56,9 +86,11 @@ def largest_of(answer: InertialResult) -> tuple[str, str]:
     value = answer.largest_radial_error_m
     if not is_number(value):
         return ABSENT, ""
-    at = answer.largest_radial_error_at_s
+    at, utc = answer.largest_radial_error_at_s, answer.largest_radial_error_utc
     miles = number(value / M_PER_NAUTICAL_MILE, 2, "nmi")
-    return number(value, 0, "m"), f"{miles}, against GNSS" + (f", at {clock(at)}" if is_number(at) else "")
+    when = f", at {clock(at)}" if is_number(at) else ""
+    in_utc = f" ({utc[:10]} {utc[11:19]} UTC)" if utc else ""
+    return number(value, 0, "m"), f"{miles}, against GNSS{when}{in_utc}"
 
 
 def lead_of(lead: str, topic: str, results: FlightResults) -> str:
@@ -78,14 +110,6 @@ def drift_of(answer: InertialResult) -> tuple[float | None, str]:
     return answer.radial_error_rate_fit_nmiph, "time-position fit"
 
 
-def is_start_unknown(answer: InertialResult) -> bool:
-    """Tell whether the start of navigation is unknown.
-
-    False for answers of older versions, which did not look for it.
-    """
-    return answer.navigation_start is not None and answer.navigation_start.time_s is None
-
-
 def growth(answer: InertialResult) -> str:
     """Return the position error at the ends of the log, and the time between them, in words."""
     minutes = None if answer.compared_hours is None else 60.0 * answer.compared_hours
@@ -94,32 +118,26 @@ def growth(answer: InertialResult) -> str:
 
 
 def forecast_claim(answer: ForecastResult, sentences: tuple[str, ...], tone: Tone) -> Claim | None:
-    """Return the error of the shipped forecast after an hour; None without an error.
+    """Return what 95 % of the errors stay within after an hour; None without an error.
 
-    The horizon is the longest up to an hour, or the shortest where all are longer.
+    The raw INS stands beside the default method: the difference is what the estimator buys. The horizon is the longest
+    up to an hour, or the shortest where all are longer.
     """
-    rows = [row for row in answer.skill if is_number(row.rms_m)]
-    shipped = {row.horizon_min: row for row in rows if row.method == answer.default_method}
-    if not shipped:
+    found = judged_outage(answer)
+    if found is None:
         return None
-    horizon = max((lead for lead in shipped if lead <= HOUR_MIN), default=min(shipped))
-    raw = _of("raw_ins", horizon, rows)
-    value = number(shipped[horizon].rms_m, 0, "m")
-    against = f"; raw INS {number(raw.rms_m, 0, 'm')}" if raw is not None else ""
-    title, remark = f"Forecast, {horizon:g} min", f"RMS after {horizon:g} min without GNSS{against}"
+    ours, raw = found
+    lead, value = f"{ours.horizon_min:g} min", number(ours.p95_m, 0, "m")
+    against = "" if raw is None else f"; raw INS {number(raw.p95_m, 0, 'm')}"
     return Claim(
         Rank.FORECAST,
-        Mark(tone, WORDS[tone]),
-        f"Forecast off by {value} after {horizon:g} min without GNSS",
+        DOUBTFUL if tone == "warn" else MEASURED,
+        f"Forecast: 95 % within {value} after {lead} without GNSS{against}",
         value,
-        remark,
+        f"95 % after {lead} without GNSS, corrected{against}",
         sentences,
-        ((title, value, f"RMS{against}"),),
+        ((f"Forecast, {lead}", value, f"95 %{against}"),),
     )
-
-
-def _of(method: str, horizon_min: float, rows: list[SkillRow]) -> SkillRow | None:
-    return next((row for row in rows if row.method == method and row.horizon_min == horizon_min), None)
 
 
 def advise(results: FlightResults) -> Iterator[Advice]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from groundstation.base.words import listed
 from groundstation.chapters.parts import Note
-from groundstation.chapters.wording import is_number, number, percent, typeset
+from groundstation.chapters.wording import clock, is_number, number, percent, typeset
 from groundstation.results.forecast_methods import FORECAST_METHODS
 from groundstation.systems.inertial.forecast_answer import FEWEST_STARTS, ForecastResult, SkillRow
 
@@ -39,14 +39,27 @@ def _gain(answer: ForecastResult) -> Note | None:
     if not shared:
         return None
     horizon = HEADLINE_MIN if HEADLINE_MIN in shared else shared[-1]
-    ours, theirs = shipped[horizon].rms_m, raw[horizon].rms_m
+    ours, theirs = shipped[horizon], raw[horizon]
     better = [lead for lead in shared if shipped[lead].rms_m < raw[lead].rms_m]
     text = (
-        f"After {horizon:g} min without GNSS the shipped method ({title_of(default)}) is off by {number(ours, 0, 'm')} "
-        f"RMS, the raw INS by {number(theirs, 0, 'm')}, over {number(shipped[horizon].starts, 0)} starts; it "
-        f"beats the raw INS {_where(better, shared)}."
+        f"After {horizon:g} min without GNSS 95 % of the errors are below {number(ours.p95_m, 0, 'm')} by the shipped "
+        f"method ({title_of(default)}) and below {number(theirs.p95_m, 0, 'm')} by the raw INS (RMS "
+        f"{number(ours.rms_m, 0, 'm')} and {number(theirs.rms_m, 0, 'm')}), over {number(ours.starts, 0)} starts; it "
+        f"beats the raw INS {_where(better, shared)}.{_early(answer, 60.0 * horizon)}"
     )
     return Note(text, "good" if len(better) == len(shared) else "warn")
+
+
+def _early(answer: ForecastResult, length_s: float) -> str:
+    """Return the error of such outages that begin earlier; empty without any."""
+    early = [row for row in answer.phases if row.is_early and row.length_s == length_s]
+    if not early:
+        return ""
+    row = max(early, key=lambda one: one.starts)
+    return (
+        f" Outages that begin before {clock(answer.first_start_s)} ({row.phase}): {number(row.rms_m, 0, 'm')} RMS, the "
+        f"raw INS {number(row.raw_rms_m, 0, 'm')}."
+    )
 
 
 def _honesty(answer: ForecastResult) -> Note | None:
@@ -70,7 +83,8 @@ def _honesty(answer: ForecastResult) -> Note | None:
     misfit = _misfit(shares, list(known))
     if not misfit:
         return Note(f"{text}the σ it claims is honest on this flight.{left}", "warn" if start else "good")
-    return Note(f"{text}{misfit}.{left}", "warn")
+    is_narrow = any(share < HONEST[0] for share in shares.values())
+    return Note(f"{text}{misfit}.{left}", "warn" if start or is_narrow else "plain")  # too wide misleads nobody
 
 
 def _uncalibrated(answer: ForecastResult) -> str:

@@ -17,6 +17,7 @@ from groundstation.systems.inertial.answer import ChannelResult, InertialResult,
 from groundstation.systems.inertial.azimuth import estimate_azimuth
 from groundstation.systems.inertial.coupled import CoupledRun
 from groundstation.systems.inertial.differences import InsDifferences, differences, only_used
+from groundstation.systems.inertial.drift_answer import utc_of
 from groundstation.systems.inertial.filter import (
     ChannelsRun,
     DifferenceEpochs,
@@ -182,6 +183,7 @@ def _result(
     rate_50, rate_95, rate_fit = _radial_rates(epochs, radial, start.time_s)
     with_error = np.flatnonzero(np.isfinite(radial))
     ends = with_error[[0, -1]] if len(with_error) else with_error
+    largest_s = float(epochs.time_s[np.nanargmax(radial)]) if len(ends) else None
     speed = velocity[np.isfinite(velocity).all(axis=1)]
     return InertialResult(
         ins_topic=compared.ins_topic,
@@ -200,7 +202,8 @@ def _result(
         radial_error_rate_fit_nmiph=rate_fit,
         velocity_error_rms_mps=float(np.sqrt(np.mean(np.sum(speed**2, axis=1)))) if len(speed) else None,
         largest_radial_error_m=float(np.nanmax(radial)) if len(ends) else None,
-        largest_radial_error_at_s=float(epochs.time_s[np.nanargmax(radial)]) if len(ends) else None,
+        largest_radial_error_at_s=largest_s,
+        largest_radial_error_utc=utc_of(flight.start_ns if flight.has_utc else None, largest_s),
         navigation_start=start,
         radial_error_first_m=float(radial[ends[0]]) if len(ends) else None,
         radial_error_last_m=float(radial[ends[1]]) if len(ends) else None,

@@ -88,7 +88,7 @@ def assess_forecast(
         calibration_reason=plan.reason,
         skill=skill,
         gaps=gap_rows(run, judged.at, _lengths_that_fit(plan), settings=settings),
-        phases=_phases(run, coupled, bank, settings, phase_of),
+        phases=_phases(run, coupled, bank, settings, phase_of, judged),
         classic_starts=classic,
         calibration=calibration_rows(replay, claimed, plan.horizons_min, plan.first_start_s),
         coupled=coupled_rows(coupled, separate.of(since), settings, horizons_min=plan.horizons_min),
@@ -127,27 +127,40 @@ def _lengths_that_fit(plan: ReplayPlan) -> tuple[float, ...]:
 
 
 def _phases(
-    run: ChannelsRun, coupled: CoupledRun, bank: NoiseBank, settings: InertialSettings, phase_of: PhaseOf | None
+    run: ChannelsRun,
+    coupled: CoupledRun,
+    bank: NoiseBank,
+    settings: InertialSettings,
+    phase_of: PhaseOf | None,
+    judged: Hindcast,
 ) -> tuple[PhaseRow, ...]:
-    """Outages of 10 s to 1 h that begin in each phase, default method beside raw INS."""
+    """Outages of 10 s to 1 h that begin in each phase, default method beside raw INS.
+
+    From the first judged start on they are the judged ones; before it they come every minute.
+    """
     if phase_of is None:
         return ()
-    at = start_epochs(run.epochs, float(run.epochs.time_s[0]) + PHASE_FROM_S, PHASE_STEP_S)
-    phases = phase_of(run.epochs.time_s[at])
+    first_s = float(judged.start_s[0]) if len(judged.start_s) else np.inf
+    early = start_epochs(run.epochs, float(run.epochs.time_s[0]) + PHASE_FROM_S, PHASE_STEP_S)
+    early = early[run.epochs.time_s[early] < first_s - 1e-6]
     methods = tuple(dict.fromkeys(("raw_ins", settings.default_method)))
     rows = []
-    for lengths, step in ((SHORT_S, SHORT_S[0]), (LONG_S, LONG_S[0])):
-        lead_s = leads_of(step, lengths[-1])
-        replay = _of_model(hindcast(run, at, lead_s, methods, settings, bank), coupled, settings)
-        for length in lengths:
-            lead = round(length / step) - 1
-            errors = {method: replay.radial_m(method)[:, lead] for method in methods}
-            for phase in dict.fromkeys(phases.tolist()):
-                here = (phases == phase) & np.isfinite(errors["raw_ins"])
-                if here.sum() >= LEAST_STARTS:
-                    rms = {method: float(np.sqrt(np.mean(np.square(errors[method][here])))) for method in methods}
-                    rows.append(PhaseRow(phase, length, int(here.sum()), rms[settings.default_method], rms["raw_ins"]))
-    return tuple(sorted(rows, key=lambda row: (row.phase, row.length_s)))
+    for at, is_early in ((early, True), (judged.at, False)):
+        if not len(at):
+            continue
+        phases = phase_of(run.epochs.time_s[at])
+        for lengths, step in ((SHORT_S, SHORT_S[0]), (LONG_S, LONG_S[0])):
+            lead_s = leads_of(step, lengths[-1])
+            replay = _of_model(hindcast(run, at, lead_s, methods, settings, bank), coupled, settings)
+            for length in lengths:
+                lead = round(length / step) - 1
+                errors = {method: replay.radial_m(method)[:, lead] for method in methods}
+                for phase in dict.fromkeys(phases.tolist()):
+                    here = (phases == phase) & np.isfinite(errors["raw_ins"])
+                    if here.sum() >= LEAST_STARTS:
+                        rms = [float(np.sqrt(np.mean(np.square(errors[method][here])))) for method in methods]
+                        rows.append(PhaseRow(phase, length, int(here.sum()), rms[-1], rms[0], is_early))
+    return tuple(sorted(rows, key=lambda row: (row.phase, not row.is_early, row.length_s)))
 
 
 def _classic(

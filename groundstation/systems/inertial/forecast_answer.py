@@ -62,7 +62,8 @@ class GapRow:
 class PhaseRow:
     """Replayed outages of one length that begin in one phase of flight, default method.
 
-    Their starts are closer together than those of ``SkillRow`` and come earlier in the flight: the numbers differ.
+    ``is_early``: they begin before ``first_start_s``, when the filter has hardly settled, and every minute. All others
+    are those of ``SkillRow``, parted by phase. None of an older version, which had both in one row.
     """
 
     schema_name: ClassVar[str] = "phase_outage"
@@ -72,6 +73,7 @@ class PhaseRow:
     starts: int
     rms_m: float
     raw_rms_m: float
+    is_early: bool | None = None
 
 
 @dataclass(frozen=True)

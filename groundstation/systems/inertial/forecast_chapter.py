@@ -19,7 +19,6 @@ from groundstation.systems.inertial.forecast_answer import (
     CoupledRow,
     ForecastResult,
     GapRow,
-    PhaseRow,
     SkillRow,
     honesty,
 )
@@ -48,7 +47,7 @@ def forecast(results: FlightResults) -> Section | None:
         _gaps(answer.gaps),
     )
     workings: tuple[Part | None, ...] = (
-        *(_default_in_detail(answer), *_calibration(answer), _phases(answer.phases), _coupled(answer.coupled)),
+        *(_default_in_detail(answer), *_calibration(answer), _phases(answer), _coupled(answer.coupled)),
     )
     headline = f"Shipped method: {title_of(answer.default_method)}"
     tone: Tone = "warn" if any(note.tone == "warn" for note in notes) else "good"
@@ -171,22 +170,22 @@ def _gaps(gaps: tuple[GapRow, ...]) -> Grid | None:
     return Grid("Gaps with GNSS on both sides", heads, rows, caption) if rows else None
 
 
-def _phases(phases: tuple[PhaseRow, ...]) -> Grid | None:
+def _phases(answer: ForecastResult) -> Grid | None:
+    first = clock(answer.first_start_s)
     rows = [
         (
-            row.phase,
+            row.phase if row.is_early is None else f"{row.phase}, {'before' if row.is_early else 'from'} {first}",
             clock(row.length_s),
             number(row.starts, 0),
             number(row.rms_m, 1),
             number(row.raw_rms_m, 1),
         )
-        for row in phases
+        for row in answer.phases
     ]
     heads = _heads("Begins in", ("Length", "Starts", "Shipped, RMS m", "Raw INS, RMS m"))
     caption = (
-        "Lengths in min:s. These starts are not those of the skill table: they come every 60 s from 10 min after the "
-        "first epoch, when the filter has hardly settled. The numbers therefore differ from the skill at equal "
-        "lengths."
+        f"Lengths in min:s. From {first} of flight time on: the starts of the skill table, hence the same numbers. "
+        "Before it: every 60 s from 10 min after the first epoch, when the filter has hardly settled."
     )
     return Grid("Outages by phase of flight", heads, rows, caption) if rows else None
 

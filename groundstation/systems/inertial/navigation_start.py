@@ -128,8 +128,11 @@ def _by_standstill(compared: InsDifferences, gnss: GnssNoise) -> NavigationStart
         return _unproven("no GNSS position beside the INS")
     seen_s = float(epochs.time_s[both[0]])
     still_s = _moves_from_s(compared, seen_s + STAND_S)
+    limit_m = SIGMAS * float(np.hypot(gnss.position_white_m, gnss.position_correlated_m))
     if still_s - seen_s < LEAST_STAND_S:
-        return _unproven("the aircraft moves where INS and GNSS are first logged together")
+        first_m = float(np.hypot(*epochs.position_m[both[0]]))
+        is_set = f", {first_m:.0f} m apart, as after its position was set to GNSS" if first_m <= limit_m else ""
+        return _unproven(f"the aircraft moves where INS and GNSS are first logged together{is_set}")
     stand = (epochs.time_s >= seen_s) & (epochs.time_s < min(still_s, seen_s + COMPARED_S))
     apart_m = np.nanmean(epochs.position_m[stand], axis=0)
     known = stand & np.isfinite(epochs.velocity_mps).all(axis=1)
@@ -138,7 +141,6 @@ def _by_standstill(compared: InsDifferences, gnss: GnssNoise) -> NavigationStart
     waited_s = float(np.mean(epochs.time_s[stand])) - float(epochs.time_s[0])
     at_first_m = apart_m - error_mps * waited_s if waited_s <= LONGEST_WAIT_S else apart_m
     nearest_m = min(float(np.hypot(*apart_m)), float(np.hypot(*at_first_m)))
-    limit_m = SIGMAS * float(np.hypot(gnss.position_white_m, gnss.position_correlated_m))
     if nearest_m > limit_m:
         seen_m = float(np.hypot(*apart_m))
         return _unproven(f"at the standstill where the log begins the INS is {seen_m:.0f} m off GNSS already")

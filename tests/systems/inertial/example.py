@@ -291,8 +291,11 @@ def forecast_result(duration_s: float = LONG_S, **changes: Any) -> ForecastResul
             for length, size in zip((10, 30, 60, 90), sizes, strict=True)
         ),
         phases=(
-            *(PhaseRow("airborne", length, 31, 0.4 * length, 0.9 * length) for length in (10.0, 60.0, 600.0, 3600.0)),
-            PhaseRow("taxi", 60.0, 4, 12.0, 30.0),
+            *(
+                PhaseRow("airborne", length, 31, 0.4 * length, 0.9 * length, is_early=False)
+                for length in (10.0, 60.0, 600.0, 3600.0)
+            ),
+            PhaseRow("taxi", 60.0, 4, 12.0, 30.0, is_early=True),
         ),
         classic_starts=tuple(
             ClassicStart(hours, method, 60.0, size / hours, -0.8 * size / hours)

@@ -167,8 +167,8 @@ def with_share(share: float, *, raised: bool) -> dict[str, Any]:
         (0.80, False, "warn", "the filter is overconfident"),
         (0.80, True, "warn", "the filter is overconfident"),
         (0.995, False, "warn", "the filter is too careful, its sigmas are too large"),
-        (0.995, True, "plain", "innovations cannot show whether the filter is consistent"),
-        (1.0, True, "plain", "innovations cannot show whether the filter is consistent"),
+        (0.995, True, "plain", "this log does not test the σ of the filter"),
+        (1.0, True, "plain", "this log does not test the σ of the filter"),
     ],
 )
 def test_conclusion_on_the_filter_follows_its_innovations(share: float, raised: bool, tone: str, verdict: str) -> None:

@@ -64,7 +64,7 @@ def test_a_heading_that_is_surely_wrong_is_the_headline() -> None:
     assert sentence == f"INS corrected by GNSS, within 3.0 m of it (95 %); {wrong}"
     assert "heading wrong by 2.1 ± 0.3" in section.headline.replace("\u202f", " ")
     assert section.claim is not None and section.claim.headline == section.headline
-    assert (section.claim.mark.tone, section.claim.mark.text) == ("warn", "Wrong")
+    assert (section.claim.mark.tone, section.claim.mark.text) == ("warn", "Filter wrong")
     assert [one[:2] for one in section.claim.figures[1:]] == [
         ("Error, heading", "1.2 °"),
         ("Error, horizontal position", "0.84 m"),
@@ -78,7 +78,7 @@ def test_without_a_large_error_the_usual_ones_are_told_with_sigma() -> None:
     section, sentence = told(Judge(wrong=(SMALL,)))
     errors = "heading 1.2 deg (sigma 0.15) and horizontal position 0.8 m (sigma 0.3), RMS"
     assert sentence.endswith(f"; judged by a better unit: {errors}")
-    assert section.claim is not None and section.claim.mark.text == "Judged"
+    assert section.claim is not None and section.claim.mark.text == "Measured"
 
 
 def test_a_departure_stays_in_front() -> None:

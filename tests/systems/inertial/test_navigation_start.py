@@ -8,14 +8,22 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import groundstation
 from groundstation.base.errors import SettingsError
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
+from groundstation.cli.lines import line_of
 from groundstation.cli.main import app
+from groundstation.pipeline.one_flight.flight import sentence
+from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.verbs.acceptance import accept
+from groundstation.results.answer import by_analysis
 from groundstation.systems.inertial import chapter
+from groundstation.systems.inertial.analysis import INERTIAL
 from groundstation.systems.inertial.answer import InertialResult
+from groundstation.systems.inertial.drift_answer import judged_outage
 from groundstation.systems.inertial.estimate import Estimation, estimate_ins_errors
+from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.systems.known import AircraftData
 from groundstation.tables.table import Flight
 from tests.acceptance_example import save_fleet, save_flight
@@ -27,6 +35,7 @@ STAND_S = 120.0
 START_NS = 1_777_874_400 * NS_PER_S
 NMI_M, S_PER_H = 1852.0, 3600.0
 RATE_NMIPH = 1.2
+PLACE = ("latitude_deg", "longitude_deg")
 SAME = 1e-6  # of a rate, whatever part of the log is cut off in front
 
 
@@ -167,8 +176,66 @@ def test_a_stated_start_that_is_no_time_is_refused_where_it_stands() -> None:
 def test_the_chapter_says_why_there_is_no_rate() -> None:
     found = result(begun_at(flight_from_stand(), 900.0))
     claim = chapter.inertial_claim(found, "", is_doubtful=False)
-    assert claim.headline.replace("\u202f", " ") == "INS error 553 m at first, 3322 m after 75 min"
+    assert claim.headline.replace("\u202f", " ") == "INS error grew at 1.20 nmi/h within the log"
+    assert (claim.mark.tone, claim.mark.text) == ("unknown", "No rate"), "no rate is no pass"
     assert claim.remark == "no rate: nothing shows when navigation began"
+    why = claim.sentences[0].replace("\u202f", " ")
+    assert "position error 553 m at first, 3322 m after 75 min" in why and "state nav_start_utc" in why
+    line = INERTIAL.sentence(by_analysis(found))
+    assert line.startswith("no rate: INS error grew 1.20 nmi/h in log (state nav_start_utc), max ")
+
+
+def test_an_error_that_begins_at_zero_in_flight_is_told_as_set_there() -> None:
+    set_there = result(begun_at(flight_from_stand(), 900.0))
+    assert set_there.navigation_start is not None and "position was set" not in set_there.navigation_start.reason
+    flight = begun_at(flight_from_stand(), 900.0)
+    both = [{name: flight[kind].columns[name].values for name in PLACE} for kind in ("ins", "gnss")]
+    apart = {name: both[0][name] - (both[0][name][0] - both[1][name][0]) for name in PLACE}
+    start = result(changed(flight, "ins", **apart)).navigation_start
+    assert start is not None and start.time_s is None
+    assert start.reason.endswith(" m apart, as after its position was set to GNSS")
+
+
+def test_a_stated_start_stands_on_the_line_and_the_page() -> None:
+    found = result(begun_at(flight_from_stand(), 900.0), utc_ns_to_iso(START_NS))
+    line = INERTIAL.sentence(by_analysis(found))
+    start = utc_ns_to_iso(START_NS)
+    rate = f"INS {found.radial_error_rate_fit_nmiph:.2f} nmi/h since the start as stated"
+    assert line.startswith(f"{rate} (the aircraft file says {start}), max ")
+    claim = chapter.inertial_claim(found, "", is_doubtful=False)
+    assert (claim.mark.text, claim.figures[0][0]) == ("Measured", "INS drift")
+    assert f"stated: the aircraft file says {start}" in claim.figures[0][2].replace("\u202f", " ")
+
+
+def test_the_largest_error_has_its_utc() -> None:
+    flight = flight_from_stand()
+    found = result(flight)
+    at_s = found.largest_radial_error_at_s
+    assert at_s is not None
+    utc = utc_ns_to_iso(flight.start_ns + round(at_s * NS_PER_S), 0)
+    assert found.largest_radial_error_utc == utc
+    assert f"at {utc[11:19]} UTC" in INERTIAL.sentence(by_analysis(found))
+    (row,) = [one for one in chapter.inertial_claim(found, "", is_doubtful=False).figures if one[0].startswith("Larg")]
+    assert row[2].endswith(f"({utc[:10]} {utc[11:19]} UTC)")
+    without = result(replace(flight, has_utc=False))
+    assert without.largest_radial_error_utc == "" and "UTC" not in INERTIAL.sentence(by_analysis(without))
+
+
+@pytest.mark.real_log
+def test_the_largest_error_of_a_recorded_ins_is_that_of_its_row() -> None:
+    """By hand from the rows, on the ellipsoid: 17 989 s; 17 998 s is 1 cm below it, 17 991 s 6 cm."""
+    found = groundstation.open(real_log("inertial/gv_ff02.csv")).results
+    answer, ahead = found.answer(InertialResult), found.answer(ForecastResult)
+    assert answer is not None and ahead is not None
+    assert (answer.largest_radial_error_at_s, answer.largest_radial_error_utc) == (17_989.0, "2014-06-02T01:01:01Z")
+    assert answer.largest_radial_error_m == pytest.approx(5896.0, abs=1.0)
+    pair = judged_outage(ahead)
+    assert pair is not None and pair[1] is not None
+    late = [one for one in ahead.phases if one.length_s == 3600.0 and not one.is_early]
+    assert [(one.rms_m, one.raw_rms_m) for one in late] == [pytest.approx((pair[0].rms_m, pair[1].rms_m))]
+    line = line_of(Outcome("gv_ff02.csv", "done", sentence(found), flight_id=found.flight_id))
+    assert line.startswith("no rate: INS error grew 0.61 nmi/h in log (state nav_start_utc), max 3.18 nmi at 01:01:01")
+    assert "95 % forecast 942 m at 60 min" in line and len(line) <= 160
 
 
 def test_flights_without_a_start_stand_outside_the_acceptance(tmp_path: Path) -> None:

@@ -79,8 +79,11 @@ def test_drift_and_error_after_an_hour_stand_on_the_front(tmp_path: Path) -> Non
     told = told_above(tmp_path)
     assert told.headline.replace("\u202f", " ") == "Unaided INS, drifts 0.37 nmi/h"
     (tile,) = told.others
-    assert tile.claim.value.replace("\u202f", " ") == "483 m"
-    assert "raw INS 1790 m" in tile.claim.remark.replace("\u202f", " ")
+    told_by = {row.method: row.p95_m for row in forecast_result().skill if row.horizon_min == 60.0}
+    ours, raw = told_by[forecast_result().default_method], told_by["raw_ins"]
+    assert tile.claim.value.replace("\u202f", " ") == f"{ours:.0f} m"
+    remark = tile.claim.remark.replace("\u202f", " ")
+    assert remark == f"95 % after 60 min without GNSS, corrected; raw INS {raw:.0f} m"
 
 
 def test_of_an_aided_ins_differences_and_its_own_filter_are_drawn() -> None:
