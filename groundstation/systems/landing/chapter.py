@@ -56,7 +56,7 @@ SOURCES = (
 TITLE = "Approaches"
 NOT_STABILISED, NOT_MEASURED = "not stabilised", "not measured"
 TONES: dict[str, Tone] = {"stabilised": "good", NOT_STABILISED: "warn", NOT_MEASURED: "unknown"}
-MOST_TOLD = 6
+MOST_TOLD, MOST_ALSO = 6, 2
 HOW = (
     "How computed: a final leads straight to a touchdown, or follows the guidance down to a height where a climb "
     f"begins. Deviations are converted to metres by the course sector ({DOTS_PER_FULL_SCALE:g} dots to its edge) and "
@@ -95,8 +95,8 @@ def _claim(answer: LandingResult) -> Claim | None:
     if one is None:
         return None
     state = _verdict(one)
-    others = len(answer.approaches) - 1
-    also = f" {others} more {'approach' if others == 1 else 'approaches'} in the log." if others else ""
+    others = [f"{_name(other)}: {_verdict(other).text}" for other in answer.approaches if other is not one]
+    also = f" Also in the log: {'; '.join(others[:MOST_ALSO])}{' ...' if others[MOST_ALSO:] else ''}." if others else ""
     return Claim(
         Rank.LANDING_OPEN if state.text == NOT_MEASURED else Rank.LANDING,
         Mark(state.tone, state.text.capitalize()),

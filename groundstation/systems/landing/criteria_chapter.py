@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import M_PER_FOOT, M_PER_NAUTICAL_MILE
@@ -36,7 +37,7 @@ HEADS = (
     Head("Criterion"),
     Head("Value", True),
     Head("Limit", True),
-    Head("Height; before threshold"),
+    Head("Height; before threshold, as recorded"),
     Head("Source; remark"),
 )
 GATE_STATES = {"passed": Mark("good", "met"), "failed": Mark("warn", "not met")}
@@ -117,9 +118,9 @@ def _rest(one: Approach) -> Grid | None:
         (
             Mark(TONES[criterion.state], criterion.state),
             criterion.kind.title[:1].upper() + criterion.kind.title[1:],
-            _value(criterion),
+            value_text(criterion),
             limits_text(criterion),
-            "" if criterion.kind.group == "landing" else _where(criterion.at),
+            _place_of(criterion),
             _told(criterion.kind.source, criterion.reason),
         )
         for criterion in one.criteria
@@ -132,7 +133,7 @@ def _rest(one: Approach) -> Grid | None:
     caption = (
         "±: 95 %, where the value has an uncertainty; undecided: it reaches over the limit. No limit: that of "
         "the type or the operator, set in [landing.criteria]. Wind: mean from the lower check height, a headwind is "
-        f"a negative tailwind. {EDITIONS}"
+        f"a negative tailwind. Corrected: less the error of the positions at the threshold. {EDITIONS}"
     )
     return Grid(f"Approach {one.number}: wind, thrust, threshold and landing", HEADS, rows, caption)
 
@@ -146,12 +147,12 @@ def _not_logged(titles: Iterable[str], reason: str = NO_VALUE) -> list[tuple[Cel
     return [(Mark("unknown", state), sentence(listed).rstrip("."), ABSENT, ABSENT, "", typeset(told))]
 
 
-def _value(one: Criterion) -> str:
+def value_text(one: Criterion) -> str:
     """Return a value with its 95 % interval, to the digits that this lets it have.
 
     Examples
     --------
-    >>> _value(Criterion(name="tailwind", state="met", unit="m/s", value=0.757, sigma=2.5))
+    >>> value_text(Criterion(name="tailwind", state="met", unit="m/s", value=0.757, sigma=2.5))
     '0.8 ± 4.9\u202fm/s'
     """
     unit = unit_sign(one.unit)
@@ -181,6 +182,13 @@ def _limits_in_metres(one: Criterion) -> str:
     if one.at_most is not None:
         return "≤ " + number_with_unit(significant(one.at_most, 4), unit)
     return ABSENT if one.at_least is None else "≥ " + number_with_unit(significant(one.at_least, 4), unit)
+
+
+def _place_of(one: Criterion) -> str:
+    """Return where the value was found: on the ground nowhere, over the threshold its height alone."""
+    if one.at is None or one.kind.group == "landing":
+        return ""
+    return _where(one.at if one.kind.group == "approach" else replace(one.at, before_threshold_m=None))
 
 
 def _where(at: Place | None) -> str:

@@ -3,12 +3,14 @@
 The final from above and from the side.
 """
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
 
 from groundstation.base.units import DOTS_PER_FULL_SCALE
 from groundstation.chapters.plots.common import M_PER_KM, has_values
+from groundstation.chapters.wording import number
 from groundstation.plots.axes import ZERO, broken_time_axis, time_axis
 from groundstation.plots.marks import AnyMark, Band, Curve, Dots, Floats, Limit, Points, Role, Told
 from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
@@ -53,11 +55,36 @@ def deviations(results: FlightResults, of: str) -> Plot | None:
         f"Approach {one.number}: deviations",
         "Line: deviation by the guidance, in metres. Dots: the same by recorded positions, and by the recorded height. "
         "Shade: one dot. Broken lines: ± 95 % figures of the categories (horizontal and vertical), CAT II and III ILS "
-        f"look-alike. Linear within {LINEAR_M:g} m, logarithmic beyond.",
+        f"look-alike. Linear within {LINEAR_M:g} m, logarithmic beyond. {_apart(one)}",
         "Lateral and vertical deviation of the approach against distance to the threshold.",
         (Row((lateral,), 38.0, shares_x=True), Row((vertical,), 38.0)),
         ("landing_path",),
     )
+
+
+def _apart(one: Approach) -> str:
+    """Return why dots and line differ, with the figures: errors of the recorded positions, and their steps."""
+    if not one.guidance_topic:
+        return ""
+    of_these = one.position_topic
+    across = next((row for row in one.position_errors if row.topic == of_these and row.error_m is not None), None)
+    along = next((row for row in one.along_errors if row.topic == of_these and row.error_m is not None), None)
+    told = []
+    if across is not None:
+        told.append(f"the positions are {number(across.error_m, 0, 'm', signed=True)} off across the course")
+    if along is not None and along.error_m is not None:
+        slope = math.tan(math.radians(one.runway.glide_angle_deg))
+        per_km = "" if along.scale is None else number((along.scale - 1.0) * M_PER_KM * slope, 0, "m", signed=True)
+        more = f", {per_km} more for each km before it (scale of height and distance)" if per_km else ""
+        told.append(
+            f"{number(along.error_m, 0, 'm', signed=True)} off along it, by which the dots of the height lie "
+            f"{number(along.error_m * slope, 0, 'm', signed=True)} off the line at the threshold{more}"
+        )
+    if not told:
+        return "Dots and line differ by the errors of positions, height and guidance."
+    step = one.position_step_m
+    steps = f"; they jump with the steps of {number(step[0], 0)} × {number(step[1], 0, 'm')}" if step else ""
+    return f"Dots and line differ: {'; '.join(told)}{steps}."
 
 
 def _deviation(own: LandingPath, guided: Floats, placed: Floats, dot_m: Floats, *, is_vertical: bool) -> Panel:
@@ -110,9 +137,9 @@ def final(results: FlightResults, of: str) -> Plot | None:
     return Plot(
         f"landing.final.{of}",
         f"Approach {one.number}: the final",
-        f"Above: positions against the course line and its sector of ± {DOTS_PER_FULL_SCALE:g} dots, scales differ. "
-        f"Below: height by {one.height_source or 'nothing'} and the path; fine lines are the check heights. "
-        f"Threshold: {where}.",
+        f"Above: positions as recorded, the course line and its sector of ± {DOTS_PER_FULL_SCALE:g} dots, scales "
+        f"differ. Below: height by {one.height_source or 'nothing'} at these positions, and the path; fine lines are "
+        f"the check heights. Threshold: {where}.",
         "The final from above with the course sector, and from the side with the glide path.",
         (Row((_from_above(one, own),), 28.0, shares_x=True), Row((_from_the_side(one, own),), 33.0)),
         ("landing_path",),

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from groundstation.chapters.wording import with_feet
 from groundstation.plots.marks import AnyMark, Dots, Limit, Outlines, Points
 from groundstation.plots.plot import Axis, Panel, Plot, one_panel
 from groundstation.results.flight import FlightResults
@@ -40,8 +41,8 @@ def runway_from_above(results: FlightResults, of: str) -> Plot | None:
     return Plot(
         f"landing.runway.{of}",
         f"Approach {one.number}: on the runway",
-        f"Runway {one.runway.name} as the {one.runway.placed_by} has it, and the positions as recorded. "
-        f"{_sigmas(one)}Scales differ.",
+        f"Runway {one.runway.name} as the {one.runway.placed_by} has it, positions and touchdown as recorded. "
+        f"{_corrected(one)}{_sigmas(one)}Scales differ.",
         "The runway from above with the recorded positions and the touchdown.",
         one_panel(panel, 30.0),
         ("landing_path",),
@@ -57,6 +58,21 @@ def _rings(one: Approach, end_m: float) -> tuple[np.ndarray, ...]:
     return tuple(
         np.array([(low, -half_m), (high, -half_m), (high, half_m), (low, half_m), (low, -half_m)])
         for low, high in edges
+    )
+
+
+def _corrected(one: Approach) -> str:
+    """Return where the touchdown was without the error of the positions; empty where none was taken off."""
+    found = {row.name: row for row in one.criteria if row.value is not None}
+    past, aside = found.get("touchdown"), found.get("centre_line")
+    recorded_m = None if one.touchdown is None else one.touchdown.past_threshold_m
+    if past is None or past.value is None or aside is None or recorded_m is None:
+        return ""
+    if round(past.value) == round(recorded_m):
+        return ""
+    return (
+        f"Corrected, the touchdown is {with_feet(past.value)} beyond the threshold, {with_feet(aside.value)} off the "
+        "centre line. "
     )
 
 

@@ -10,6 +10,8 @@ import pytest
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.parts import Grid
 from groundstation.chapters.wording import sentence
+from groundstation.plots.marks import Curve, Dots
+from groundstation.plots.plot import Panel
 from groundstation.reports.drawing import Drawing, drawn_by
 from groundstation.results.answer import by_analysis
 from groundstation.results.flight import FlightResults, Source
@@ -19,6 +21,7 @@ from groundstation.systems.landing.analysis import LANDING
 from groundstation.systems.landing.answer import GatePlace, LandingResult, StabilisedAt, StabilityLost
 from groundstation.systems.landing.chapter import landing
 from groundstation.systems.landing.criteria_answer import Place
+from groundstation.systems.landing.plots import deviations
 from groundstation.systems.landing.stabilised import decide
 from groundstation.systems.landing.verdict_answer import verdict_words
 from tests.recording_contents import Contents
@@ -125,6 +128,30 @@ def test_limits_on_the_page_are_those_of_the_settings(with_site: FlightResults) 
     assert section is not None
     text = markdown(section).replace("\u202f", " ")
     assert "down to 45 m" in text and "within 0.75 dot of the course and 1 dot of the path" in text
+
+
+@pytest.mark.parametrize(("along_m", "across_m"), [(-300.0, 150.0), (400.0, -80.0)])
+def test_the_figure_of_deviations_says_by_how_much_its_dots_are_off_the_line(along_m: float, across_m: float) -> None:
+    scenario = replace(PLAIN, recorded=replace(EXACT, along_m=along_m, across_m=across_m))
+    answer = found(simulate_approach(scenario).flight, site(scenario)).answer
+    told = replace(results(True), answers=by_analysis(answer), figures=answer.figures)
+    plot = deviations(told, "1")
+    assert plot is not None
+    lateral, vertical = (row.panels[0] for row in plot.rows)
+
+    def apart_m(panel: Panel) -> float:
+        """Dots less the line, near the threshold."""
+        (dots,) = (mark for mark in panel.marks if isinstance(mark, Dots))
+        (line,) = (mark for mark in panel.marks if isinstance(mark, Curve))
+        near = (np.asarray(dots.x) > 0.0) & (np.asarray(dots.x) < 1.0)
+        return float(np.nanmedian((np.asarray(dots.y) - np.asarray(line.y))[near]))
+
+    found_across, found_along, found_height = (
+        float(number.replace("−", "-")) for number in re.findall(r"([−+]\d+)\u202fm off", plot.caption)
+    )
+    assert found_across == pytest.approx(across_m, abs=5.0) and apart_m(lateral) == pytest.approx(found_across, abs=5.0)
+    assert found_along == pytest.approx(along_m, abs=100.0), "the antenna's height is some 60 m along the course"
+    assert apart_m(vertical) == pytest.approx(found_height, abs=5.0), "the height of the antenna is 3 m of it"
 
 
 def test_every_figure_is_drawn(with_site: FlightResults) -> None:
