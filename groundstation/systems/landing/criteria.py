@@ -272,7 +272,7 @@ def _threshold(seen: _Seen, touchdown: Touchdown) -> dict[str, _Value]:
         height, by = _at(seen.path.time_s[rows], seen.relative.height_m, crossing_s), seen.path.altitude_source
     sink = _at(seen.path.time_s, seen.path.sink_rate_mps, crossing_s) or 0.0
     sigma = math.hypot(settings.height_sigma_m, sink * time_sigma_s)
-    at, how = Place(crossing_s, height, 0.0), f"threshold crossed by positions {seen.off.brief}"
+    at, how = Place(crossing_s, height, 0.0), f"over the threshold by positions {seen.off.brief}"
     indicated = _at(seen.path.time_s, seen.logged.indicated_mps, crossing_s)
     by_air = seen.logged.sources.get("indicated", "")
     value, reason = indicated, "" if indicated is not None or not by_air else "no indicated airspeed at the threshold"

@@ -17,7 +17,7 @@ from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import padded
 from groundstation.results.flight import FlightResults
 from groundstation.results.landing_categories import CATEGORIES
-from groundstation.systems.landing.answer import Approach, LandingResult
+from groundstation.systems.landing.answer import AlongError, Approach, LandingResult
 from groundstation.systems.landing.arrays import LandingPath, LandingProtection
 from groundstation.systems.landing.runway_plots import runway_from_above
 
@@ -70,21 +70,31 @@ def _apart(one: Approach) -> str:
     across = next((row for row in one.position_errors if row.topic == of_these and row.error_m is not None), None)
     along = next((row for row in one.along_errors if row.topic == of_these and row.error_m is not None), None)
     told = []
-    if across is not None:
-        told.append(f"the positions are {number(across.error_m, 0, 'm', signed=True)} off across the course")
+    if across is not None and across.error_m is not None:
+        side = "right" if across.error_m > 0.0 else "left"
+        told.append(f"{number(abs(across.error_m), 0, 'm')} {side} of where the localizer has the aircraft")
     if along is not None and along.error_m is not None:
-        slope = math.tan(math.radians(one.runway.glide_angle_deg))
-        per_km = "" if along.scale is None else number((along.scale - 1.0) * M_PER_KM * slope, 0, "m", signed=True)
-        more = f", {per_km} more for each km before it (scale of height and distance)" if per_km else ""
-        told.append(
-            f"{number(along.error_m, 0, 'm', signed=True)} off along it, by which the dots of the height lie "
-            f"{number(along.error_m * slope, 0, 'm', signed=True)} off the line at the threshold{more}"
-        )
+        side = "ahead of" if along.error_m > 0.0 else "behind"
+        told.append(f"{number(abs(along.error_m), 0, 'm')} {side} where height and glide path have it")
     if not told:
         return "Dots and line differ by the errors of positions, height and guidance."
     step = one.position_step_m
-    steps = f"; they jump with the steps of {number(step[0], 0)} × {number(step[1], 0, 'm')}" if step else ""
-    return f"Dots and line differ: {'; '.join(told)}{steps}."
+    steps = f", in steps of {number(step[0], 0)} × {number(step[1], 0, 'm')}" if step else ""
+    where = f"at the threshold the positions are {' and '.join(told)}{steps}"
+    return f"Dots and line differ: {where}. {_of_the_height(one, along)}"
+
+
+def _of_the_height(one: Approach, along: AlongError | None) -> str:
+    """Return how far the dots of the height are off the line, by the error of the positions along the course."""
+    if along is None or along.error_m is None:
+        return ""
+    slope = math.tan(math.radians(one.runway.glide_angle_deg))
+    here_m, per_km_m = along.error_m * slope, ((along.scale or 1.0) - 1.0) * M_PER_KM * slope
+    more = f", {number(per_km_m, 0, 'm', signed=True)} more for each km before it (scale of height and distance)"
+    return (
+        f"That moves the dots of the height by {number(here_m, 0, 'm', signed=True)} at the threshold"
+        f"{more if round(per_km_m) else ''}."
+    )
 
 
 def _deviation(own: LandingPath, guided: Floats, placed: Floats, dot_m: Floats, *, is_vertical: bool) -> Panel:

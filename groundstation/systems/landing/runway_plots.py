@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from groundstation.chapters.wording import with_feet
 from groundstation.plots.marks import AnyMark, Dots, Limit, Outlines, Points
 from groundstation.plots.plot import Axis, Panel, Plot, one_panel
 from groundstation.results.flight import FlightResults
 from groundstation.systems.landing.answer import Approach, LandingResult
 from groundstation.systems.landing.arrays import LandingPath
+from groundstation.systems.landing.criteria_chapter import value_text
 
 BEFORE_M = 1_200.0  # the threshold, from where positions are drawn
 BEYOND_M = 200.0  # the end
@@ -41,7 +41,7 @@ def runway_from_above(results: FlightResults, of: str) -> Plot | None:
     return Plot(
         f"landing.runway.{of}",
         f"Approach {one.number}: on the runway",
-        f"Runway {one.runway.name} as the {one.runway.placed_by} has it, positions and touchdown as recorded. "
+        f"Runway {one.runway.name} as the {one.runway.placed_by} has it, the positions and the touchdown as recorded. "
         f"{_corrected(one)}{_sigmas(one)}Scales differ.",
         "The runway from above with the recorded positions and the touchdown.",
         one_panel(panel, 30.0),
@@ -70,10 +70,7 @@ def _corrected(one: Approach) -> str:
         return ""
     if round(past.value) == round(recorded_m):
         return ""
-    return (
-        f"Corrected, the touchdown is {with_feet(past.value)} beyond the threshold, {with_feet(aside.value)} off the "
-        "centre line. "
-    )
+    return f"Corrected, it is {value_text(past)} beyond the threshold, {value_text(aside)} off the centre line. "
 
 
 def _sigmas(one: Approach) -> str:

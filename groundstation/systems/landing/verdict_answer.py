@@ -15,7 +15,7 @@ DEVIATION = " deviation"  # of the title of a criterion, left out where dots fol
 
 
 def verdict_words(checks: Sequence[StabilisedAt]) -> tuple[str, ...]:
-    """Return the verdicts from the check heights down, those that agree told together.
+    """Return the verdicts from the check heights down, those that agree told together, what was not measured last.
 
     Each names what failed and by how much, and counts the criteria that failed, held, and were not judged.
 
@@ -35,7 +35,7 @@ def verdict_words(checks: Sequence[StabilisedAt]) -> tuple[str, ...]:
 1 failed, 1 not judged',)
     """
     told: dict[tuple[str, str], list[str]] = {}
-    for at in checks:
+    for at in sorted(checks, key=lambda at: at.verdict == "not measured"):
         told.setdefault(_words(at), []).append(in_feet_too(at.height_m))
     return tuple(f"{before} {listed(heights)}{after}" for (before, after), heights in told.items())
 

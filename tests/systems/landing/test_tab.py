@@ -78,8 +78,8 @@ def test_a_verdict_says_what_it_rests_on(with_site: FlightResults) -> None:
     empty = tuple(replace(one, state="not_measured") for one in high.gates)
     said = claimed(with_site, high=replace(high, gates=empty, verdict=decide(empty)), low=partly)
     assert said == (
-        "Not measured from 305 m (1000 ft), no criterion is in the log. "
-        "Stabilised from 152 m (500 ft): 2 held, 5 not judged."
+        "Stabilised from 152 m (500 ft): 2 held, 5 not judged. "
+        "Not measured from 305 m (1000 ft), no criterion is in the log."
     )
     reason = "the straight final begins at 200 m"
     failed = tuple(replace(one, state="failed", value=9.3) if one.name == "bank" else one for one in gates)
@@ -92,11 +92,11 @@ def test_a_verdict_says_what_it_rests_on(with_site: FlightResults) -> None:
         high=unmeasured,
         low=replace(not_stabilised, lost=StabilityLost(152.4, 1000.0, "bank", is_from_the_start=True)),
     )
-    first, counts = f"Not measured from 305 m (1000 ft), {reason}. ", "1 failed, 2 held, 4 not judged"
-    assert said == first + f"Outside limits at 152 m (500 ft), bank up to 9.3° left: {counts}."
+    rest, counts = f" Not measured from 305 m (1000 ft), {reason}.", "1 failed, 2 held, 4 not judged"
+    assert said == f"Outside limits at 152 m (500 ft), bank up to 9.3° left: {counts}.{rest}"
     left = replace(not_stabilised, lost=StabilityLost(83.8, 1010.0, "bank", is_from_the_start=False))
     said = claimed(with_site, high=unmeasured, low=left)
-    assert said == first + f"Within limits at 152 m (500 ft), left at 84 m (275 ft), bank up to 9.3° left: {counts}."
+    assert said == f"Within limits at 152 m (500 ft), left at 84 m (275 ft), bank up to 9.3° left: {counts}.{rest}"
 
 
 @pytest.mark.parametrize(("above_path_m", "side"), [(120.0, "high"), (-60.0, "low")])
@@ -146,11 +146,18 @@ def test_the_figure_of_deviations_says_by_how_much_its_dots_are_off_the_line(alo
         near = (np.asarray(dots.x) > 0.0) & (np.asarray(dots.x) < 1.0)
         return float(np.nanmedian((np.asarray(dots.y) - np.asarray(line.y))[near]))
 
-    found_across, found_along, found_height = (
-        float(number.replace("−", "-")) for number in re.findall(r"([−+]\d+)\u202fm off", plot.caption)
+    told = re.search(
+        r"(\d+) m (left|right) of where .* and (\d+) m (ahead|behind).* by ([−+]\d+) m at the threshold",
+        plot.caption.replace("\u202f", " "),
     )
-    assert found_across == pytest.approx(across_m, abs=5.0) and apart_m(lateral) == pytest.approx(found_across, abs=5.0)
-    assert found_along == pytest.approx(along_m, abs=100.0), "the antenna's height is some 60 m along the course"
+    assert told is not None
+    assert told[2] == ("right" if across_m > 0.0 else "left") and told[4] == ("ahead" if along_m > 0.0 else "behind")
+    assert float(told[1]) == pytest.approx(abs(across_m), abs=5.0)
+    assert apart_m(lateral) == pytest.approx(across_m, abs=5.0)
+    assert float(told[3]) == pytest.approx(abs(along_m), abs=100.0), (
+        "the antenna's height is some 60 m along the course"
+    )
+    found_height = float(told[5].replace("−", "-"))
     assert apart_m(vertical) == pytest.approx(found_height, abs=5.0), "the height of the antenna is 3 m of it"
 
 
