@@ -49,10 +49,6 @@ def _of(one: Approach) -> list[Finding]:
             what, code = "its sign is reversed, or it is of another runway", "landing.deviation_reversed"
         text = f"{name}: positions move by {ratio:.2f} of what {one.guidance_topic} shows: {what}"
         found.append(Finding("warn", code, text, one.guidance_topic, place))
-    if one.position_step_m is not None:
-        north_m, east_m = one.position_step_m
-        text = f"{name}: positions are written in steps of {north_m:.0f} m north, {east_m:.0f} m east"
-        found.append(Finding("info", "landing.coarse_positions", text, one.position_topic, place))
     found += _of_touchdown(one, name)
     for error in one.position_errors:
         if error.state == "measured" and error.error_m is not None and error.sigma_m is not None:
