@@ -135,7 +135,10 @@ class Constancy:
 
 
 def _step_between_held(values: FloatArray, differs: BoolArray) -> float:
-    """Return the smallest step between values of two samples or more with at most one between; 0 without any."""
+    """Return the smallest step from one value that lasts to the next; 0 without any.
+
+    A value lasts for two samples or more, and at most one sample lies between the two.
+    """
     held = np.flatnonzero(~differs)
     steps = np.abs(values[held[1:]] - values[held[:-1]])[np.diff(held) <= NEXT_HELD]
     steps = steps[steps > 0.0]

@@ -62,7 +62,7 @@ def is_watched(topic: str, name: str) -> bool:
 
 
 def _shared(one: ConstantStretch, other: ConstantStretch) -> ConstantStretch | None:
-    """Return the records that two stretches share, with the value of the first; None where they share none."""
+    """Return the records that two stretches share, with the value of the first; or None."""
     first = max(one.first, other.first, key=lambda place: place.record_index)
     last = min(one.last, other.last, key=lambda place: place.record_index)
     return one._replace(first=first, last=last) if first.record_index < last.record_index else None

@@ -67,7 +67,7 @@ class _Off:
         return CORRECTED if self.along_by else AS_RECORDED
 
     def along_told(self, recorded: str = "") -> str:
-        """Tell a figure along the runway as corrected, beside it as recorded, or as recorded alone."""
+        """Tell how a figure along the runway is corrected, and what is recorded."""
         return _corrected(self.along_m, self.along_by, recorded)
 
     def across_told(self, recorded: str = "") -> str:

@@ -185,7 +185,7 @@ def _limits_in_metres(one: Criterion) -> str:
 
 
 def _place_of(one: Criterion) -> str:
-    """Return where the value was found: on the ground nowhere, over the threshold its height alone."""
+    """Return where the value was found; over the threshold the height alone."""
     if one.at is None or one.kind.group == "landing":
         return ""
     return _where(one.at if one.kind.group == "approach" else replace(one.at, before_threshold_m=None))

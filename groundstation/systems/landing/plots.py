@@ -63,7 +63,7 @@ def deviations(results: FlightResults, of: str) -> Plot | None:
 
 
 def _apart(one: Approach) -> str:
-    """Return why dots and line differ, with the figures: errors of the recorded positions, and their steps."""
+    """Return why dots and line differ: errors of the recorded positions, their steps."""
     if not one.guidance_topic:
         return ""
     of_these = one.position_topic
@@ -85,7 +85,7 @@ def _apart(one: Approach) -> str:
 
 
 def _of_the_height(one: Approach, along: AlongError | None) -> str:
-    """Return how far the dots of the height are off the line, by the error of the positions along the course."""
+    """Return how far the positions' error along the course moves the dots of the height."""
     if along is None or along.error_m is None:
         return ""
     slope = math.tan(math.radians(one.runway.glide_angle_deg))

@@ -62,7 +62,7 @@ def _rings(one: Approach, end_m: float) -> tuple[np.ndarray, ...]:
 
 
 def _corrected(one: Approach) -> str:
-    """Return where the touchdown was without the error of the positions; empty where none was taken off."""
+    """Return where the touchdown was without the error of the positions, if it is known."""
     found = {row.name: row for row in one.criteria if row.value is not None}
     past, aside = found.get("touchdown"), found.get("centre_line")
     recorded_m = None if one.touchdown is None else one.touchdown.past_threshold_m

@@ -81,7 +81,7 @@ def _along(down: Touchdown) -> str:
 
 
 def _beyond(one: Approach, down: Touchdown) -> tuple[str, str, str]:
-    """Return the distance beyond the threshold: that of the criterion, which is corrected where it can be."""
+    """Return the distance beyond the threshold, corrected where the criterion is."""
     name = "Beyond the threshold"
     if down.past_threshold_m is None:
         return name, ABSENT, typeset(one.runway.place_reason)

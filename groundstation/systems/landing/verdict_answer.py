@@ -1,4 +1,4 @@
-"""Verdict on the stability of an approach in words: one wording for terminal, findings and page.
+"""Verdict on the stability of an approach in words, for terminal, findings and page.
 
 Units and signs are those of a terminal; a page typesets them.
 """
@@ -15,9 +15,10 @@ DEVIATION = " deviation"  # of the title of a criterion, left out where dots fol
 
 
 def verdict_words(checks: Sequence[StabilisedAt]) -> tuple[str, ...]:
-    """Return the verdicts from the check heights down, those that agree told together, what was not measured last.
+    """Return the verdicts from the check heights down, those not measured last.
 
-    Each names what failed and by how much, and counts the criteria that failed, held, and were not judged.
+    Those that agree are told together. Each names what failed and by how much, and counts the criteria that failed,
+    held, and were not judged.
 
     Examples
     --------
