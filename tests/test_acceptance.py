@@ -1,6 +1,7 @@
 """Acceptance: errors of flights against limits, the confidence of the claim, what is left out, pages and exit codes."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from groundstation.base.errors import SettingsError, UsageError
 from groundstation.base.findings import Finding
 from groundstation.chapters.acceptance import sections
 from groundstation.chapters.acceptance_front import front
+from groundstation.chapters.parts import Grid
 from groundstation.cli.main import app
 from groundstation.methods.fleet.acceptance import CORRELATION_CONFIDENCE, judge
 from groundstation.methods.fleet.confidence import (
@@ -148,6 +150,36 @@ def test_a_folder_is_accepted_and_what_does_not_count_says_why(tmp_path: Path) -
     ratio = found.judgements[0].accuracy_ratio  # 2 nmi/h over 3 h against 5 m of either axis
     assert ratio == pytest.approx(2.0 * 3.0 * 1852.0 / (2.4477 * 5.0), rel=1e-3)
     assert found.judgements[1].decision == "not flown" and "none flown" in " ".join(front(found).sentences)
+
+
+@pytest.mark.parametrize(
+    ("claim", "rates", "said"),
+    [
+        ("these", [0.5], "takes 59 flights; this 1 is 58 short"),
+        ("these", [0.5] * 12, "takes 59 flights; these 12 are 47 short"),
+        ("type", [0.5] * 12, "takes 59 flights; these 12 count as 1.0 and are 58 short"),
+        ("these", [0.5] * 58 + [2.5], "takes 93 flights; these 59 are 34 short if none more is over"),
+    ],
+)
+def test_a_page_says_how_many_flights_a_claim_takes_and_how_many_are_short(
+    tmp_path: Path, claim: str, rates: list[float], said: str
+) -> None:
+    for number, rate in enumerate(rates):
+        save_flight(tmp_path / "out", number, rate)
+    path = tmp_path / "own.toml"
+    path.write_text(
+        f'title = "own"\nsource = "own"\nclaim = "{claim}"\n[[limits]]\nname = "rate"\ntitle = "Rate"\n'
+        'bounds = [{ quantity = "radial_rate_fit_nmiph", at_most = 2.0 }]\n'
+    )
+    found = accept(tmp_path / "out", str(path))
+    top = front(found)
+    assert "claim on 95% of flights at 95% confidence takes" in top.headline
+    assert said.partition(" if none")[0] in top.headline and said in " ".join(top.sentences)
+    (grid,) = (
+        part for section in sections(found) for part in section.parts if getattr(part, "title", "") == "All flights"
+    )
+    assert isinstance(grid, Grid) and [head.title for head in grid.heads][:1] == ["Limit"]
+    assert not [head.title for head in grid.heads if re.search(r"[a-z][A-Z]", head.title)], "a name of a class"
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ CLAIMS = {
         "independent flights."
     ),
     "units": "The claim is on all INS of the kind flown. Each INS counts at most once, however often it flew.",
-    "these": "The claim is on the INS flown alone. Each of their flights counts.",
+    "these": "The claim is on the INS flown alone. Each of their flights counts; it takes no fewer of them.",
 }
 ROLES = ("Prepared", "Checked", "Approved")
 NOT_MEASURED = "Acceleration, roll, pitch and attitude rate are not judged: the logs hold no reference for them."
@@ -95,9 +95,9 @@ def _objective(found: Acceptance) -> str:
 
 
 LIMIT_HEADS = (
-    *(Head("AcceptanceLimit"), Head("Flights", True), Head("Over", True), Head("INS", True), Head("Worth", True)),
+    *(Head("Limit"), Head("Flights", True), Head("Over", True), Head("INS", True), Head("Worth", True)),
     *(Head("Within, at least", True), Head("Share stays below", True), Head("Reference ratio", True)),
-    *(Head("More flights", True), Head("Verdict")),
+    *(Head("Needed", True), Head("Short by", True), Head("Verdict")),
 )
 
 
@@ -111,8 +111,9 @@ def _limits(found: Acceptance) -> Grid | None:
     caption = (
         "Worth: number of independent flights that they count as. Within, at least: lower limit of the share of "
         "flights within. Share stays below: order statistic, the largest error without the flights that may be over. "
-        "Reference ratio: limit over the error of the reference, both 95 %, smallest of the flights. More flights: "
-        "independent flights needed if none is over; in brackets, at the present share."
+        "Reference ratio: limit over the error of the reference, both 95 %, smallest of the flights. Needed: "
+        "independent flights that the claim takes, with those over now. Short by: how many of them are still to fly, "
+        "none over; in brackets, at the present share."
     )
     return Grid("All flights", LIMIT_HEADS, rows, caption) if rows else None
 
@@ -127,6 +128,7 @@ def _judged(limit: AcceptanceLimit, one: Judgement) -> tuple[Cell, ...]:
         at_least(one.share_low) if one.flights else ABSENT,
         bound_text(limit, one),
         number(one.accuracy_ratio, 0),
+        number(one.flights_needed, 0),
         ABSENT if one.decision == "not flown" else more,
         MARKS[one.decision],
     )

@@ -65,8 +65,7 @@ def headline(found: Acceptance) -> str:
         return f"{stated(limit.share)} of flights within the limits: shown at {sure} confidence"
     if worst.decision == "fail":
         return f"{clean(limit.title)}: fewer than {stated(limit.share)} of flights within, at {sure} confidence"
-    more = f"{number(worst.more_with_none_over, 0)} more flights needed, all within"
-    return f"{clean(limit.title)}: {_over(worst)}{more}"
+    return f"{clean(limit.title)}: {_over(worst)}{_short(found, worst)}"
 
 
 def _over(one: Judgement) -> str:
@@ -79,9 +78,8 @@ def _told(found: Acceptance, one: Judgement) -> str:
         return f"{clean(limit.title)}: none flown, not judged."
     asked = f"wanted {wanted(limit)} on {stated(limit.share)}"
     if not one.flights:
-        return (
-            f"{clean(limit.title)}: measured on none of {number(one.not_measured, 0)} flights, {asked}. {_missing(one)}"
-        )
+        told = f"{clean(limit.title)}: measured on none of {number(one.not_measured, 0)} flights, {asked}."
+        return f"{told} {_missing(found, one)}".strip()
     flown = f"{number(one.over, 0)} of {number(one.flights, 0)} flights of {number(one.ins_units, 0)} INS over"
     worth = f" (worth {number(one.effective_flights, 1)} independent flights)" if is_worth_less(one) else ""
     told = (
@@ -90,7 +88,7 @@ def _told(found: Acceptance, one: Judgement) -> str:
     )
     if one.not_measured:
         told += f" {number(one.not_measured, 0)} more not judged: the limited quantity was not measured."
-    return f"{told} {_missing(one)}".strip()
+    return f"{told} {_missing(found, one)}".strip()
 
 
 def stated(share: float) -> str:
@@ -121,18 +119,31 @@ def is_worth_less(one: Judgement) -> bool:
     return one.effective_flights < one.flights - 0.05
 
 
-def _missing(one: Judgement) -> str:
+def _short(found: Acceptance, one: Judgement) -> str:
+    """Return how many flights the claim takes, and how many these are short of it."""
+    share, sure = stated(found.limit(one.limit).share), stated(found.standard.confidence)
+    needed = f"a claim on {share} of flights at {sure} confidence takes {number(one.flights_needed, 0)} flights"
+    if not one.flights:
+        return f"{needed}, none is there"
+    are = "this 1 is" if one.flights == 1 else f"these {number(one.flights, 0)} are"
+    if is_worth_less(one):
+        are = f"these {number(one.flights, 0)} count as {number(one.effective_flights, 1)} and are"
+    return f"{needed}; {are} {number(one.more_with_none_over, 0)} short"
+
+
+def _missing(found: Acceptance, one: Judgement) -> str:
     if one.decision != "not enough flights":
         return ""
-    more = f"Missing: {number(one.more_with_none_over, 0)} more independent flights, all within"
+    short = _short(found, one)
+    told = f"{short[:1].upper()}{short[1:]}"
     if not one.over:
-        return f"{more}."
+        return f"{told}."
     at_share = (
         "no number suffices at the present share"
         if one.more_at_present_share is None
         else f"{number(one.more_at_present_share, 0)} at the present share"
     )
-    return f"{more}, {at_share}."
+    return f"{told} if none more is over, {at_share}."
 
 
 def wanted(limit: AcceptanceLimit) -> str:

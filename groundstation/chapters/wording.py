@@ -7,6 +7,7 @@ from typing import Any, TypeGuard
 
 from groundstation.base.printable import printable
 from groundstation.base.unit_names import UNITS, split_unit
+from groundstation.base.units import M_PER_FOOT
 from groundstation.base.words import clock_text
 
 ABSENT = "—"
@@ -49,6 +50,17 @@ def number(value: Any, places: int, unit: str = "", signed: bool = False) -> str
     if not unit:
         return text
     return text + (unit if unit in "°′%" else NARROW_SPACE + unit)
+
+
+def with_feet(value_m: Any, places: int = 0) -> str:
+    """Return a height or a length of an approach in metres, and in feet as crews speak of it.
+
+    Examples
+    --------
+    >>> with_feet(83.9), with_feet(None)
+    ('84\u202fm (275\u202fft)', '—')
+    """
+    return f"{number(value_m, places, 'm')} ({number(value_m / M_PER_FOOT, 0, 'ft')})" if is_number(value_m) else ABSENT
 
 
 def percent(share: Any, places: int = 0) -> str:

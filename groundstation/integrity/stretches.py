@@ -13,6 +13,7 @@ from groundstation.integrity.clock import ClockModel
 
 MOST_STRETCHES = 512  # kept of a field: the longest
 CHANGES_MEASURED = 512  # number of changes of a batch that are measured
+NEXT_HELD = 3  # rows from the last pair of equal samples to the next, with one sample between
 FloatArray = NDArray[np.float64]
 
 
@@ -56,13 +57,11 @@ class Constancy:
     ----------
     samples, changes : int
         Finite samples so far, and how many of them differ from the one before.
-    resolution : float
-        Smallest change seen while some samples did not change; 0 when that never happened.
     """
 
     def __init__(self, min_samples: int) -> None:
         self.samples = self.changes = 0
-        self.resolution = 0.0
+        self._step = self._smallest = 0.0
         self._min_samples = min_samples
         self._kept: list[NDArray[Any]] = []  # ended, and long enough
         self._open = np.zeros(0, dtype=_STRETCH)  # the one that may go on, once there is one
@@ -97,9 +96,20 @@ class Constancy:
         self._open = found[-1:]
         if 0 < changes < count - 1:
             at = np.flatnonzero(differs)[:CHANGES_MEASURED]
-            with np.errstate(over="ignore"):  # from one end of a float to the other
+            with np.errstate(over="ignore", invalid="ignore"):  # from one end of a float to the other, or no numbers
                 smallest = float(np.abs(values[at + 1] - values[at]).min())
-            self.resolution = min(self.resolution or smallest, smallest)
+                step = _step_between_held(values, differs)
+            self._smallest = min(self._smallest or smallest, smallest)
+            self._step = min(self._step or step, step or self._step)
+
+    @property
+    def resolution(self) -> float:
+        """Smallest step from one value that lasts to the next.
+
+        A value interpolated between the two, by a reader that puts fields on one clock, is no step. Where values never
+        last one after the other, the smallest change of a batch with some that did not change; 0 without any.
+        """
+        return self._step or self._smallest
 
     def stretches(self) -> list[ConstantStretch]:
         """Return the long stretches, in the order of the log."""
@@ -122,6 +132,17 @@ class Constancy:
         if sum(map(len, self._kept)) > MOST_STRETCHES:
             kept = np.concatenate(self._kept)
             self._kept = [kept[np.argsort(-kept["samples"], kind="stable")[: MOST_STRETCHES // 2]]]
+
+
+def _step_between_held(values: FloatArray, differs: BoolArray) -> float:
+    """Return the smallest step from one value that lasts to the next; 0 without any.
+
+    A value lasts for two samples or more, and at most one sample lies between the two.
+    """
+    held = np.flatnonzero(~differs)
+    steps = np.abs(values[held[1:]] - values[held[:-1]])[np.diff(held) <= NEXT_HELD]
+    steps = steps[steps > 0.0]
+    return float(steps.min()) if len(steps) else 0.0
 
 
 def _ends_and_long(differs: BoolArray, changes: int, min_samples: int) -> tuple[Int64Array, Int64Array]:

@@ -3,6 +3,7 @@
 Nothing is called stuck without a witness: a parked aircraft, a held slow channel and a constant are no damage.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -58,6 +59,13 @@ class StuckPlace:
 def is_watched(topic: str, name: str) -> bool:
     """Tell whether a field may be found stuck."""
     return name in WATCHED and kind_of(topic) in _KINDS
+
+
+def _shared(one: ConstantStretch, other: ConstantStretch) -> ConstantStretch | None:
+    """Return the records that two stretches share, with the value of the first; or None."""
+    first = max(one.first, other.first, key=lambda place: place.record_index)
+    last = min(one.last, other.last, key=lambda place: place.record_index)
+    return one._replace(first=first, last=last) if first.record_index < last.record_index else None
 
 
 class _Seen(NamedTuple):
@@ -137,7 +145,7 @@ class Judge:
         long = {name: list(self._long(name, constancy)) for name, constancy in fields.items()}
         found = {}
         for name, stretches in long.items():
-            told = [(one, self._why(topic, name, one, fields[name], long)) for one in stretches]
+            told = [(one, self._why(topic, name, one, fields, long)) for one in stretches]
             stuck = tuple(self._told(one, why) for one, why in told if why)
             if stuck:
                 found[name] = stuck
@@ -166,10 +174,11 @@ class Judge:
         topic: str,
         name: str,
         stretch: ConstantStretch,
-        constancy: Constancy,
+        fields: dict[str, Constancy],
         long: dict[str, list[ConstantStretch]],
     ) -> str:
         """Return the evidence that the value should have changed; empty when there is none."""
+        constancy = fields[name]
         if name in _NOISY:
             return self._why_noisy(stretch, constancy.usual_samples(without=stretch))
         least = self._limits.times_resolution * constancy.resolution
@@ -182,7 +191,7 @@ class Judge:
         scale = METRES_PER_DEG * self._shrinks(name, stretch)
         enough_m = max(self._limits.position_m, least * scale)
         why = self._why_elsewhere(topic, (name,), stretch, enough_m, "m", scale)
-        return why or self._why_position(topic, name, stretch, enough_m, long)
+        return why or self._why_position(topic, name, stretch, fields, long)
 
     def _shrinks(self, name: str, stretch: ConstantStretch) -> float:
         """Return the length of a degree of longitude over that of one of latitude.
@@ -220,17 +229,30 @@ class Judge:
         return None
 
     def _why_position(
-        self, topic: str, name: str, stretch: ConstantStretch, enough_m: float, long: dict[str, list[ConstantStretch]]
+        self,
+        topic: str,
+        name: str,
+        stretch: ConstantStretch,
+        fields: dict[str, Constancy],
+        long: dict[str, list[ConstantStretch]],
     ) -> str:
-        """Return the evidence that the aircraft moves while both coordinates stand still."""
+        """Return the evidence that the aircraft moves while both coordinates stand still.
+
+        Only the time counts in which both do, and a way of several of the steps that the two are written in.
+        """
         other = "longitude_deg" if name == "latitude_deg" else "latitude_deg"
-        first, last = stretch.first.record_index, stretch.last.record_index
-        both = any(one.first.record_index < last and one.last.record_index > first for one in long.get(other, ()))
-        speed = self._slowest(topic, stretch) or self._slowest("", stretch)
-        if not both or speed is None or speed[1] <= self._limits.moving_mps:
-            return ""
-        moved_m = speed[2] * self._seconds(stretch)
-        return f"the speed of {speed[0]} covers {moved_m:.0f} m meanwhile" if moved_m > enough_m else ""
+        steps_m = (
+            METRES_PER_DEG * self._shrinks(one, stretch) * fields[one].resolution
+            for one in (name, other)
+            if one in fields
+        )
+        enough_m = max(self._limits.position_m, self._limits.times_resolution * math.hypot(*steps_m))
+        for both in (shared for one in long.get(other, ()) if (shared := _shared(stretch, one)) is not None):
+            speed = self._slowest(topic, both) or self._slowest("", both)
+            moved_m = 0.0 if speed is None else speed[2] * self._seconds(both)
+            if speed is not None and speed[1] > self._limits.moving_mps and moved_m > enough_m:
+                return f"the speed of {speed[0]} covers {moved_m:.0f} m while both coordinates stand still"
+        return ""
 
     def _why_heading(self, topic: str, name: str, stretch: ConstantStretch, least: float) -> str:
         """Return the evidence that another heading or track turns.

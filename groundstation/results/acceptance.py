@@ -216,6 +216,8 @@ class Judgement:
     share_bound : float or None
         Upper limit, at that confidence, of what the share asked for stays below: an order statistic of the flights,
         as a part of the limit; None where there are too few flights for any.
+    flights_needed : int
+        Independent flights that the claim takes, those over now among them.
     more_with_none_over : int
         Flights more, none over, with which the limit is passed; 0 where it is.
     more_at_present_share : int or None
@@ -237,6 +239,7 @@ class Judgement:
     share_high: float
     share_low_these: float
     share_bound: float | None
+    flights_needed: int
     more_with_none_over: int
     more_at_present_share: int | None
     accuracy_ratio: float | None

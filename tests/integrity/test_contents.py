@@ -93,6 +93,57 @@ def test_a_position_that_stands_still_is_told_by_the_speed_of_its_own_topic() ->
     assert stuck_fields(ledger_of(gnss=one_alone)) == set()
 
 
+COARSE_DEG = 180.0 / 2**17  # of airliner recorders: 153 m of latitude
+
+
+def in_steps(fields: Fields, step_deg: float, between: float) -> dict[str, NDArray[np.float64]]:
+    """Positions cut to steps; where one follows, a reader has interpolated a share ``between`` of it."""
+    out = {name: np.array(values) for name, values in fields.items()}
+    for name in ("latitude_deg", "longitude_deg"):
+        held = np.floor(fields[name] / step_deg) * step_deg
+        out[name] = held + between * np.append(np.diff(held), 0.0)
+    return out
+
+
+def slowing(slow_mps: float, track_deg: float) -> dict[str, NDArray[np.float64]]:
+    """Straight on at 200 m/s for half of the time, then slow."""
+    speed_mps = np.where(TIME_S < 0.5 * SECONDS, 200.0, slow_mps)
+    ahead_m = np.cumsum(speed_mps) / RATE
+    north, east = (ahead_m * turn(np.deg2rad(track_deg)) for turn in (np.cos, np.sin))
+    return {
+        "latitude_deg": 48.0 + north / 111_195.0,
+        "longitude_deg": 2.0 + east / 74_400.0,
+        "ground_speed_mps": speed_mps,
+    }
+
+
+@pytest.mark.parametrize("between", [0.0, 0.015, 0.5])
+@pytest.mark.parametrize("track_deg", [0.0, 20.0, 45.0, 90.0, 230.0])
+def test_positions_in_coarse_steps_are_stuck_only_where_no_step_comes(track_deg: float, between: float) -> None:
+    taxi = in_steps(slowing(10.0, track_deg), COARSE_DEG, between)
+    assert stuck_fields(ledger_of(ins=taxi)) == set(), "a step takes up to 15 s"
+    fast = in_steps(slowing(60.0, track_deg), COARSE_DEG, between)
+    assert stuck_fields(ledger_of(ins=fast)) == set()
+    if track_deg % 90.0:  # a coordinate that is constant all along is none that stands still
+        frozen = frozen_in(fast, "latitude_deg", "longitude_deg", where=slice(300, 550))
+        assert stuck_fields(ledger_of(ins=frozen)) == {"ins.latitude_deg", "ins.longitude_deg"}, "for 3000 m"
+
+
+def test_coordinates_that_stand_still_one_after_the_other_are_not_stuck() -> None:
+    """Taxi to the east, then to the north: the latitude stands still, then the longitude, never both for long."""
+    corner = 300
+    ahead = np.cumsum(np.full(len(TIME_S), 12.0 / RATE))
+    east_m, north_m = np.minimum(ahead, ahead[corner]), np.maximum(ahead - ahead[corner], 0.0)
+    taxi = {
+        "latitude_deg": 48.0 + north_m / 111_195.0,
+        "longitude_deg": 2.0 + east_m / 74_400.0,
+        "ground_speed_mps": np.full(len(TIME_S), 12.0),
+    }
+    overlapping = frozen_in(taxi, "longitude_deg", where=slice(corner - 15, corner))
+    overlapping["longitude_deg"][corner:] = overlapping["longitude_deg"][corner - 1]
+    assert stuck_fields(ledger_of(gnss=overlapping)) == set(), "both stand for 3 s, 36 m"
+
+
 def test_a_speed_that_no_motion_has_tells_of_no_stuck_position() -> None:
     nonsense = frozen_in(flight(turn_dps=0.1), "latitude_deg", "longitude_deg")
     nonsense |= {"velocity_north_mps": np.full(len(TIME_S), 1e308), "velocity_east_mps": np.ones(len(TIME_S))}

@@ -83,6 +83,7 @@ def judge(flights: Sequence[FlightError], limit: AcceptanceLimit, standard: Stan
         share_high=high,
         share_low_these=share_low(count, over, standard.confidence),
         share_bound=order_bound(parts, effective, limit.share, standard.confidence),
+        flights_needed=needed,
         more_with_none_over=0 if is_shown else _whole(needed - effective),
         more_at_present_share=0 if is_shown else None if at_share is None else max(_whole(at_share - effective), 0),
         accuracy_ratio=min(ratios, default=None),

@@ -57,6 +57,7 @@ from groundstation.systems.landing.reference import (
 from groundstation.systems.landing.settings import LIMITS, LandingSettings
 from groundstation.systems.landing.stabilised import rejudge, stabilised
 from groundstation.systems.landing.touchdown import is_set_down, touchdown_of, with_evidence
+from groundstation.systems.landing.verdict_answer import verdict_words
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight
@@ -371,13 +372,12 @@ def _sentence(answers: Answers) -> str:
 
 
 def sentence_of(one: Approach) -> str:
-    """An approach in a line."""
-    verdicts = ", ".join(f"{row.verdict} from {row.height_m:.0f} m" for row in one.stabilised if row.time_s is not None)
+    """An approach in a line: its stability, else how close to the course it was."""
+    verdicts = "; ".join(verdict_words([row for row in one.stabilised if row.time_s is not None]))
     where = f"runway {one.runway.name}" if one.runway.name else f"course {one.runway.true_course_deg:.1f} deg"
-    closely = ""
-    if one.established is not None:
-        closely = f", {one.established.lateral_rms_dots:.2f} dot RMS off the course"
-    return f"{one.outcome} on {where}{closely}{': ' + verdicts if verdicts else ''}"
+    if not verdicts and one.established is not None:
+        return f"{one.outcome} on {where}, {one.established.lateral_rms_dots:.2f} dot RMS off the course"
+    return f"{one.outcome} on {where}{': ' + verdicts if verdicts else ''}"
 
 
 LANDING = Analysis(

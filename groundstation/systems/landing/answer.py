@@ -40,27 +40,33 @@ class Established:
 
 
 StabilisedVerdict = Literal["stabilised", "not stabilised", "not measured"]
+Side = Literal["", "left", "right", "low", "high"]  # of the course, of the path, or to which it banks
 
 
 @dataclass(frozen=True)
 class GatePlace:
-    """Instant at which the value of a criterion was found, by the criterion's name."""
+    """Instant at which the value of a criterion was found, by the criterion's name.
+
+    ``side``: of the course or the path, where the value counts from either; the bank's likewise.
+    """
 
     name: str
     at: Place
+    side: Side = ""
 
 
 @dataclass(frozen=True)
 class StabilityLost:
     """First loss of a limit below a check height.
 
-    ``is_from_the_start``: it was not kept at the check height itself.
+    ``is_from_the_start``: it was not kept at the check height itself. ``side``: as in :class:`GatePlace`.
     """
 
     height_m: float
     time_s: float
     criterion: str
     is_from_the_start: bool
+    side: Side = ""
 
 
 @dataclass(frozen=True)
@@ -326,7 +332,12 @@ def _events(made: Approach) -> Iterator[LandingEvent]:
         yield new(time_s=on.start_s, event="established", height_m=on.start_height_m)
         yield new(time_s=on.end_s, event="end of established", height_m=on.end_height_m)
     for lost in (check.lost for check in made.stabilised if check.lost is not None):
-        yield new(time_s=lost.time_s, event="limit left", what=lost.criterion, height_m=lost.height_m)
+        yield new(
+            time_s=lost.time_s,
+            event="limit left",
+            what=f"{lost.criterion} {lost.side}".rstrip(),
+            height_m=lost.height_m,
+        )
     places = {one.name: one.at for one in made.criteria if one.at is not None}
     for one in made.criteria:
         if one.state == "not met" and (at := places.get(one.name)) is not None:

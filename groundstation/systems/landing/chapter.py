@@ -3,7 +3,7 @@
 How each was flown, where it touched down, and what shows accuracy.
 """
 
-from groundstation.base.units import DOTS_PER_FULL_SCALE, M_PER_FOOT
+from groundstation.base.units import DOTS_PER_FULL_SCALE
 from groundstation.chapters.chapter import Remedies
 from groundstation.chapters.gates import setting_facts
 from groundstation.chapters.parts import (
@@ -31,21 +31,20 @@ from groundstation.chapters.wording import (
     sentence,
     significant,
     typeset,
-    unit_sign,
+    with_feet,
 )
 from groundstation.results.flight import FlightResults
-from groundstation.results.gates import Gate
 from groundstation.systems.landing.answer import (
     GLIDE_SLOPE_DOT,
     Approach,
     HeightError,
     LandingResult,
     PositionError,
-    StabilisedAt,
 )
 from groundstation.systems.landing.criteria_chapter import criteria_parts
 from groundstation.systems.landing.runway_chapter import along_facts, along_told, runway_facts, with_sigma
 from groundstation.systems.landing.touchdown_chapter import SINK_TIME, touchdown_parts
+from groundstation.systems.landing.verdict_answer import verdict_words
 
 LEAD = "How each approach was flown against its runway, and where it touched down."
 SOURCES = (
@@ -57,7 +56,7 @@ SOURCES = (
 TITLE = "Approaches"
 NOT_STABILISED, NOT_MEASURED = "not stabilised", "not measured"
 TONES: dict[str, Tone] = {"stabilised": "good", NOT_STABILISED: "warn", NOT_MEASURED: "unknown"}
-MOST_TOLD = 6
+MOST_TOLD, MOST_ALSO = 6, 2
 HOW = (
     "How computed: a final leads straight to a touchdown, or follows the guidance down to a height where a climb "
     f"begins. Deviations are converted to metres by the course sector ({DOTS_PER_FULL_SCALE:g} dots to its edge) and "
@@ -96,8 +95,8 @@ def _claim(answer: LandingResult) -> Claim | None:
     if one is None:
         return None
     state = _verdict(one)
-    others = len(answer.approaches) - 1
-    also = f" {others} more {'approach' if others == 1 else 'approaches'} in the log." if others else ""
+    others = [f"{_name(other)}: {_verdict(other).text}" for other in answer.approaches if other is not one]
+    also = f" Also in the log: {'; '.join(others[:MOST_ALSO])}{' ...' if others[MOST_ALSO:] else ''}." if others else ""
     return Claim(
         Rank.LANDING_OPEN if state.text == NOT_MEASURED else Rank.LANDING,
         Mark(state.tone, state.text.capitalize()),
@@ -111,39 +110,8 @@ def _claim(answer: LandingResult) -> Claim | None:
 
 
 def _why(one: Approach) -> str:
-    """Return the verdict from each check height down, with what it rests on."""
-    left: dict[str, list[str]] = {}  # where the limits were left, and the check heights where they were kept
-    told = []
-    for at in one.stabilised:
-        if at.verdict == NOT_STABILISED and at.lost is not None and not at.lost.is_from_the_start:
-            left.setdefault(f"{_in_feet_too(at.lost.height_m)}{_rests_on(at)}", []).append(_in_feet_too(at.height_m))
-        else:
-            told.append(f"From {_in_feet_too(at.height_m)}: {at.verdict}{_rests_on(at)}.")
-    told += [f"Within the limits at {' and '.join(kept_at)}, left at {where}." for where, kept_at in left.items()]
-    return " ".join(told)
-
-
-def _in_feet_too(height_m: float) -> str:
-    """Return a height in metres, and in feet as crews speak of it."""
-    return f"{number(height_m, 0, 'm')} ({number(height_m / M_PER_FOOT, 0, 'ft')})"
-
-
-def _rests_on(at: StabilisedAt) -> str:
-    """Return the criteria that failed, how many were judged, or why none was."""
-    failed = [_failed(criterion) for criterion in at.gates if criterion.state == "failed"]
-    judged = sum(criterion.state != "not_measured" for criterion in at.gates)
-    if failed:
-        return f" ({', '.join(failed)})"
-    if not judged:
-        return f" ({typeset(at.reason) or 'no criterion is in the log'})"
-    return f" ({judged} of {len(at.gates)} criteria judged)" if judged < len(at.gates) else ""
-
-
-def _failed(criterion: Gate) -> str:
-    """Return a criterion that failed: ``glide path deviation, worst 1.4 dots``."""
-    if criterion.value is None or not criterion.unit:
-        return criterion.title
-    return f"{criterion.title}, worst {number(criterion.value, 1, unit_sign(criterion.unit))}"
+    """Return the verdicts from the check heights down, each with what it rests on."""
+    return " ".join(sentence(told) for told in verdict_words(one.stabilised))
 
 
 def _figures(one: Approach) -> tuple[tuple[str, str, str], ...]:
@@ -190,8 +158,10 @@ def _verdict(one: Approach) -> Mark:
 
 def _overview(answer: LandingResult) -> Grid:
     titles = ("Straight for, km", "Lateral RMS, dot", "Vertical RMS, dot", "Touchdown, m/s down", "Peak, g")
+    checked = max((one.stabilised for one in answer.approaches), key=len, default=())
     heads = (
-        *(Head(title) for title in ("", "Approach", "Flight time", "Guidance", "From the check heights")),
+        *(Head(title) for title in ("", "Approach", "Flight time", "Guidance")),
+        *(Head(f"From {with_feet(at.height_m)}") for at in checked),
         *(Head(title, True) for title in titles),
     )
     lateral, vertical = (
@@ -201,17 +171,19 @@ def _overview(answer: LandingResult) -> Grid:
         f"RMS of the guidance deviations while established: within {lateral} dot of the course and {vertical} dot of "
         "the path."
     )
-    return Grid("Approaches", heads, [_row(one) for one in answer.approaches], caption, ("landing_path",))
+    rows = [_row(one, len(checked)) for one in answer.approaches]
+    return Grid("Approaches", heads, rows, caption, ("landing_path",))
 
 
-def _row(one: Approach) -> tuple[Cell, ...]:
+def _row(one: Approach, checks: int) -> tuple[Cell, ...]:
     on, down = one.established, one.touchdown
     return (
         str(one.number),
         _name(one),
         f"{clock(one.start_s)} – {clock(one.end_s)}",
         typeset(one.guidance_source or ("ILS" if one.guidance_topic else ABSENT)),
-        _verdict(one),
+        *(Mark(TONES[at.verdict], at.verdict) for at in one.stabilised),
+        *[ABSENT] * (checks - len(one.stabilised)),
         number(one.final_length_m / 1000.0, 1),
         number(on.lateral_rms_dots, 3) if on else ABSENT,
         number(on.vertical_rms_dots, 3) if on else ABSENT,
@@ -223,7 +195,7 @@ def _row(one: Approach) -> tuple[Cell, ...]:
 def _approach(one: Approach, answer: LandingResult, start_utc_ns: int | None) -> list[Part | None]:
     of = str(one.number)
     return [
-        Note(f"Approach {one.number}, {_name(one)}. {_told(one)}"),
+        Note(" ".join(filter(None, (f"Approach {one.number}, {_name(one)}.", _why(one), _told(one))))),
         Figure("landing.deviations", of),
         Figure("landing.final", of),
         Figure("landing.runway", of) if one.runway.is_surveyed and one.runway.length_m else None,

@@ -111,7 +111,10 @@ COLUMNS: tuple[AnswerColumn[LandingResult], ...] = (
         lambda landing: sum(_at_the_low_check(one) == "not stabilised" for one in landing.approaches),
     ),
     AnswerColumn(
-        "landing_touchdown_m", "number", "last touchdown behind the threshold, as a criterion", _criterion("touchdown")
+        "landing_touchdown_m",
+        "number",
+        "last touchdown behind the threshold, of INS positions less their error by the glide path",
+        _criterion("touchdown"),
     ),
     AnswerColumn("landing_tailwind_mps", "number", "of the last approach, headwind negative", _criterion("tailwind")),
     AnswerColumn(

@@ -19,6 +19,7 @@ from groundstation.systems.landing.settings import LandingSettings
 from groundstation.systems.landing.stabilised import PERCENT, place_at, rows_below
 from groundstation.systems.landing.sustained import worst_sustained
 from groundstation.systems.landing.touchdown_answer import Touchdown
+from groundstation.systems.landing.verdict_answer import in_feet_too
 
 if TYPE_CHECKING:
     from groundstation.systems.landing.finals import Final
@@ -28,7 +29,7 @@ FLARE_M, FLOAT_M = 50.0 * M_PER_FOOT, 20.0 * M_PER_FOOT
 # Source: ICAO Annex 14, volume I, table 5-1.
 AIMING_POINTS = ((800.0, 150.0), (1_200.0, 250.0), (2_400.0, 300.0), (math.inf, 400.0))
 LEAST_WIND_S = 20.0
-NOT_LOGGED = "not in the log"
+NOT_LOGGED, AS_RECORDED, CORRECTED = "not in the log", "as recorded", "corrected"
 NO_THRESHOLD = "the threshold is placed by the positions themselves"
 
 
@@ -48,13 +49,44 @@ class _Seen:
 
 @dataclass(frozen=True)
 class _Off:
-    """Error of the positions along and across the runway, taken off, and what remains."""
+    """Error of the positions along and across the runway, taken off, and what remains.
+
+    ``along_by`` and ``across_by`` name the reference that showed it; empty where nothing is taken off.
+    """
 
     along_m: float
     across_m: float
     along_sigma_m: float
     across_sigma_m: float
-    told: str = ""
+    along_by: str = ""
+    across_by: str = ""
+
+    @property
+    def brief(self) -> str:
+        """Say whether figures along the runway are corrected."""
+        return CORRECTED if self.along_by else AS_RECORDED
+
+    def along_told(self, recorded: str = "") -> str:
+        """Tell how a figure along the runway is corrected, and what is recorded."""
+        return _corrected(self.along_m, self.along_by, recorded)
+
+    def across_told(self, recorded: str = "") -> str:
+        """Tell a figure across the runway likewise."""
+        return _corrected(self.across_m, self.across_by, recorded)
+
+
+def _corrected(error_m: float, by: str, recorded: str) -> str:
+    """Return how a figure stands to the recorded positions.
+
+    Examples
+    --------
+    >>> _corrected(-193.2, "the glide path", "139 m"), _corrected(0.0, "", "139 m")
+    ('corrected: positions less -193 m by the glide path; 139 m as recorded', 'as recorded')
+    """
+    if not by:
+        return AS_RECORDED
+    beside = f"; {recorded} {AS_RECORDED}" if recorded else ""
+    return f"{CORRECTED}: positions less {error_m:+.0f} m by {by}{beside}"
 
 
 @dataclass(frozen=True)
@@ -164,17 +196,16 @@ def _off(
     )
     is_ins = path.position_topic.startswith("ins")
     source = settings.ins_position_sigma_m if is_ins else settings.position_noise_m
-    along_m, across_m, told = 0.0, 0.0, "positions of an INS" if is_ins else ""
+    along_m, across_m, along_by, across_by = 0.0, 0.0, "", ""
     along_sigma, across_sigma = (math.hypot(source, one, step) for one, step in zip(place, steps, strict=True))
     if is_ins:
         for beside in across:
             if beside.topic == path.position_topic and beside.error_m is not None and beside.sigma_m is not None:
-                across_m, across_sigma = beside.error_m, beside.sigma_m
+                across_m, across_sigma, across_by = beside.error_m, beside.sigma_m, "the localizer"
         for ahead in along:
             if ahead.topic == path.position_topic and ahead.error_m is not None and ahead.sigma_m is not None:
-                along_m, along_sigma = ahead.error_m, ahead.sigma_m
-                told = f"positions less their error by the glide path, {along_m:+.0f} m"
-    return _Off(along_m, across_m, along_sigma, across_sigma, told)
+                along_m, along_sigma, along_by = ahead.error_m, ahead.sigma_m, "the glide path"
+    return _Off(along_m, across_m, along_sigma, across_sigma, along_by, across_by)
 
 
 def _thrust(seen: _Seen) -> _Value:
@@ -241,14 +272,14 @@ def _threshold(seen: _Seen, touchdown: Touchdown) -> dict[str, _Value]:
         height, by = _at(seen.path.time_s[rows], seen.relative.height_m, crossing_s), seen.path.altitude_source
     sink = _at(seen.path.time_s, seen.path.sink_rate_mps, crossing_s) or 0.0
     sigma = math.hypot(settings.height_sigma_m, sink * time_sigma_s)
-    at = Place(crossing_s, height, 0.0)
+    at, how = Place(crossing_s, height, 0.0), f"over the threshold by positions {seen.off.brief}"
     indicated = _at(seen.path.time_s, seen.logged.indicated_mps, crossing_s)
     by_air = seen.logged.sources.get("indicated", "")
     value, reason = indicated, "" if indicated is not None or not by_air else "no indicated airspeed at the threshold"
     if indicated is not None and settings.reference_speed_mps is not None:
         value, reason = indicated - settings.reference_speed_mps, "above the reference speed"
     return {
-        "threshold_height": _Value(height, None if height is None else sigma, at, by),
+        "threshold_height": _Value(height, None if height is None else sigma, at, by, how if height else ""),
         "threshold_speed": _Value(value, None, at, by_air, reason),
     }
 
@@ -304,25 +335,29 @@ def _place(seen: _Seen, touchdown: Touchdown) -> dict[str, _Value]:
     past = touchdown.past_threshold_m - off.along_m
     time_m = touchdown.time_sigma_s * (touchdown.ground_speed_mps or 0.0)
     sigma, at, by = math.hypot(time_m, off.along_sigma_m), Place(touchdown.time_s, 0.0, -past), seen.path.position_topic
-    found = {"touchdown": _Value(past, sigma, at, by, off.told)}
+    told = off.along_told(in_feet_too(touchdown.past_threshold_m))
+    found = {"touchdown": _Value(past, sigma, at, by, told)}
     length_m = runway.landing_length_m if runway.landing_length_m is not None else runway.length_m
     if length_m is None:
         no_length = _Value(reason="the length of the runway is not known")
         found |= {"aiming_point": no_length, "runway_remaining": no_length}
     else:
         aiming_m = next(point for up_to, point in AIMING_POINTS if length_m < up_to)
-        told = f"aiming point {aiming_m:.0f} m behind the threshold"
+        told = f"aiming point {in_feet_too(aiming_m)} behind the threshold; {off.brief}"
         found["aiming_point"] = _Value(past - aiming_m, sigma, at, by, told)
-        found["runway_remaining"] = _Value(length_m - past, sigma, at, by, f"of {length_m:.0f} m")
+        found["runway_remaining"] = _Value(length_m - past, sigma, at, by, f"of {in_feet_too(length_m)}; {off.brief}")
     rows = slice(seen.relative.rows.start, seen.relative.rows.stop)
-    aside = _at(seen.path.time_s[rows], seen.relative.across_m - off.across_m, touchdown.time_s)
+    recorded = _at(seen.path.time_s[rows], seen.relative.across_m, touchdown.time_s)
+    if recorded is None:
+        return found | {"centre_line": _Value(None, None, at, by)}
+    aside = recorded - off.across_m
+    told = f"{_side(aside)}; {off.across_told(f'{in_feet_too(abs(recorded))} {_side(recorded)}')}"
     course_m = math.radians(runway.course_sigma_deg) * abs(past)
-    side = "" if aside is None else "right" if aside > 0.0 else "left"
-    value = None if aside is None else abs(aside)
-    found["centre_line"] = _Value(
-        value, None if value is None else math.hypot(off.across_sigma_m, course_m), at, by, side
-    )
-    return found
+    return found | {"centre_line": _Value(abs(aside), math.hypot(off.across_sigma_m, course_m), at, by, told)}
+
+
+def _side(across_m: float) -> str:
+    return "right" if across_m > 0.0 else "left"
 
 
 def _manner(seen: _Seen, touchdown: Touchdown) -> dict[str, _Value]:

@@ -6,6 +6,7 @@ from groundstation.base.findings import Finding, Severity
 from groundstation.systems.landing.answer import Approach, LandingResult
 from groundstation.systems.landing.criteria_answer import REVERSED, Criterion
 from groundstation.systems.landing.reference import fits
+from groundstation.systems.landing.verdict_answer import verdict_words
 
 
 def findings_of(answer: LandingResult, runways_problem: str = "") -> tuple[Finding, ...]:
@@ -31,11 +32,9 @@ def _of(one: Approach) -> list[Finding]:
     place = f"{one.start_s:.0f} to {one.end_s:.0f} s"
     name = f"approach {one.number}"
     found: list[Finding] = []
-    for row in one.stabilised:
-        failed = [f"{gate.title} {gate.value:.1f} {gate.unit}" for gate in row.gates if gate.state == "failed"]
-        if failed:
-            text = f"{name} not stabilised from {row.height_m:.0f} m down: {', '.join(failed)}"
-            found.append(Finding("warn", "landing.not_stabilised", text, one.position_topic, place))
+    if failed := [row for row in one.stabilised if row.verdict == "not stabilised"]:
+        text = f"{name} not stabilised: {'; '.join(verdict_words(failed))}"
+        found.append(Finding("warn", "landing.not_stabilised", text, one.position_topic, place))
     for criterion in one.criteria:
         if criterion.state == "not met" and criterion.value is not None:
             text = f"{name}: {criterion.kind.title} {criterion.value:.1f} {criterion.unit}, limit {_limits(criterion)}"
@@ -50,10 +49,6 @@ def _of(one: Approach) -> list[Finding]:
             what, code = "its sign is reversed, or it is of another runway", "landing.deviation_reversed"
         text = f"{name}: positions move by {ratio:.2f} of what {one.guidance_topic} shows: {what}"
         found.append(Finding("warn", code, text, one.guidance_topic, place))
-    if one.position_step_m is not None:
-        north_m, east_m = one.position_step_m
-        text = f"{name}: positions are written in steps of {north_m:.0f} m north, {east_m:.0f} m east"
-        found.append(Finding("info", "landing.coarse_positions", text, one.position_topic, place))
     found += _of_touchdown(one, name)
     for error in one.position_errors:
         if error.state == "measured" and error.error_m is not None and error.sigma_m is not None:

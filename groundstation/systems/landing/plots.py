@@ -3,19 +3,21 @@
 The final from above and from the side.
 """
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
 
 from groundstation.base.units import DOTS_PER_FULL_SCALE
 from groundstation.chapters.plots.common import M_PER_KM, has_values
+from groundstation.chapters.wording import number
 from groundstation.plots.axes import ZERO, broken_time_axis, time_axis
 from groundstation.plots.marks import AnyMark, Band, Curve, Dots, Floats, Limit, Points, Role, Told
 from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import padded
 from groundstation.results.flight import FlightResults
 from groundstation.results.landing_categories import CATEGORIES
-from groundstation.systems.landing.answer import Approach, LandingResult
+from groundstation.systems.landing.answer import AlongError, Approach, LandingResult
 from groundstation.systems.landing.arrays import LandingPath, LandingProtection
 from groundstation.systems.landing.runway_plots import runway_from_above
 
@@ -53,10 +55,45 @@ def deviations(results: FlightResults, of: str) -> Plot | None:
         f"Approach {one.number}: deviations",
         "Line: deviation by the guidance, in metres. Dots: the same by recorded positions, and by the recorded height. "
         "Shade: one dot. Broken lines: ± 95 % figures of the categories (horizontal and vertical), CAT II and III ILS "
-        f"look-alike. Linear within {LINEAR_M:g} m, logarithmic beyond.",
+        f"look-alike. Linear within {LINEAR_M:g} m, logarithmic beyond. {_apart(one)}",
         "Lateral and vertical deviation of the approach against distance to the threshold.",
         (Row((lateral,), 38.0, shares_x=True), Row((vertical,), 38.0)),
         ("landing_path",),
+    )
+
+
+def _apart(one: Approach) -> str:
+    """Return why dots and line differ: errors of the recorded positions, their steps."""
+    if not one.guidance_topic:
+        return ""
+    of_these = one.position_topic
+    across = next((row for row in one.position_errors if row.topic == of_these and row.error_m is not None), None)
+    along = next((row for row in one.along_errors if row.topic == of_these and row.error_m is not None), None)
+    told = []
+    if across is not None and across.error_m is not None:
+        side = "right" if across.error_m > 0.0 else "left"
+        told.append(f"{number(abs(across.error_m), 0, 'm')} {side} of where the localizer has the aircraft")
+    if along is not None and along.error_m is not None:
+        side = "ahead of" if along.error_m > 0.0 else "behind"
+        told.append(f"{number(abs(along.error_m), 0, 'm')} {side} where height and glide path have it")
+    if not told:
+        return "Dots and line differ by the errors of positions, height and guidance."
+    step = one.position_step_m
+    steps = f", in steps of {number(step[0], 0)} × {number(step[1], 0, 'm')}" if step else ""
+    where = f"at the threshold the positions are {' and '.join(told)}{steps}"
+    return f"Dots and line differ: {where}. {_of_the_height(one, along)}"
+
+
+def _of_the_height(one: Approach, along: AlongError | None) -> str:
+    """Return how far the positions' error along the course moves the dots of the height."""
+    if along is None or along.error_m is None:
+        return ""
+    slope = math.tan(math.radians(one.runway.glide_angle_deg))
+    here_m, per_km_m = along.error_m * slope, ((along.scale or 1.0) - 1.0) * M_PER_KM * slope
+    more = f", {number(per_km_m, 0, 'm', signed=True)} more for each km before it (scale of height and distance)"
+    return (
+        f"That moves the dots of the height by {number(here_m, 0, 'm', signed=True)} at the threshold"
+        f"{more if round(per_km_m) else ''}."
     )
 
 
@@ -110,9 +147,9 @@ def final(results: FlightResults, of: str) -> Plot | None:
     return Plot(
         f"landing.final.{of}",
         f"Approach {one.number}: the final",
-        f"Above: positions against the course line and its sector of ± {DOTS_PER_FULL_SCALE:g} dots, scales differ. "
-        f"Below: height by {one.height_source or 'nothing'} and the path; fine lines are the check heights. "
-        f"Threshold: {where}.",
+        f"Above: positions as recorded, the course line and its sector of ± {DOTS_PER_FULL_SCALE:g} dots, scales "
+        f"differ. Below: height by {one.height_source or 'nothing'} at these positions, and the path; fine lines are "
+        f"the check heights. Threshold: {where}.",
         "The final from above with the course sector, and from the side with the glide path.",
         (Row((_from_above(one, own),), 28.0, shares_x=True), Row((_from_the_side(one, own),), 33.0)),
         ("landing_path",),

@@ -1,7 +1,7 @@
 """Part of the chapter on the runway of an approach, and on errors along the course."""
 
 from groundstation.chapters.parts import Facts
-from groundstation.chapters.wording import ABSENT, interval, is_number, number, percent, typeset
+from groundstation.chapters.wording import ABSENT, interval, is_number, number, percent, typeset, with_feet
 from groundstation.systems.landing.answer import AlongError, Approach
 from groundstation.systems.landing.runway_answer import RunwayChoice, RunwayUsed
 
@@ -37,8 +37,8 @@ def _candidates(choice: RunwayChoice | None) -> list[tuple[str, str, str]]:
         (
             f"Probability of {typeset(one.name)}",
             percent(one.probability, 1),
-            f"ended {_aside(one.across_m)} of its centre line, {_behind(one.past_threshold_m)} its threshold, by the "
-            f"positions; course flown {number(one.course_difference_deg, 1, '°', signed=True)} from its own"
+            f"ended {_aside(one.across_m)} of its centre line, {_behind(one.past_threshold_m)} its threshold, as "
+            f"recorded; course flown {number(one.course_difference_deg, 1, '°', signed=True)} from its own"
             f"{'; closed' if one.is_closed else ''}",
         )
         for one in choice.candidates
@@ -57,7 +57,7 @@ def _measures(runway: RunwayUsed) -> list[tuple[str, str, str]]:
     sigmas = ""
     if is_number(runway.along_sigma_m) and is_number(runway.across_sigma_m):
         sigmas = f"σ {number(runway.along_sigma_m, 0)} along, {number(runway.across_sigma_m, 0, 'm')} across"
-    displaced = f"displaced by {number(runway.displaced_m, 0, 'm')}" if runway.displaced_m else ""
+    displaced = f"displaced by {with_feet(runway.displaced_m)}" if runway.displaced_m else ""
     pairs = [
         (
             "Threshold",
@@ -66,12 +66,12 @@ def _measures(runway: RunwayUsed) -> list[tuple[str, str, str]]:
         ),
     ]
     if is_number(runway.length_m):
-        width = f" × {number(runway.width_m, 0)}" if is_number(runway.width_m) else ""
-        pairs.append(("Length", f"{number(runway.length_m, 0)}{width} m", typeset(runway.surface)))
+        width = f", {with_feet(runway.width_m)} wide" if is_number(runway.width_m) else ""
+        pairs.append(("Length", f"{with_feet(runway.length_m)}{width}", typeset(runway.surface)))
     if runway.displaced_m and is_number(runway.landing_length_m):
-        pairs.append(("From the threshold to the end", number(runway.landing_length_m, 0, "m"), ""))
+        pairs.append(("From the threshold to the end", with_feet(runway.landing_length_m), ""))
     if is_number(runway.elevation_m):
-        pairs.append(("Elevation of the threshold", number(runway.elevation_m, 0, "m"), "above mean sea level"))
+        pairs.append(("Elevation of the threshold", with_feet(runway.elevation_m), "above mean sea level"))
     if is_number(runway.slope):
         slope = f"{number(100.0 * runway.slope, 2, signed=True)} %"
         pairs.append(("Slope", slope, "along the landing, by the elevations of its ends; up positive"))

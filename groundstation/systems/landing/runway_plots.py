@@ -7,6 +7,7 @@ from groundstation.plots.plot import Axis, Panel, Plot, one_panel
 from groundstation.results.flight import FlightResults
 from groundstation.systems.landing.answer import Approach, LandingResult
 from groundstation.systems.landing.arrays import LandingPath
+from groundstation.systems.landing.criteria_chapter import value_text
 
 BEFORE_M = 1_200.0  # the threshold, from where positions are drawn
 BEYOND_M = 200.0  # the end
@@ -40,8 +41,8 @@ def runway_from_above(results: FlightResults, of: str) -> Plot | None:
     return Plot(
         f"landing.runway.{of}",
         f"Approach {one.number}: on the runway",
-        f"Runway {one.runway.name} as the {one.runway.placed_by} has it, and the positions as recorded. "
-        f"{_sigmas(one)}Scales differ.",
+        f"Runway {one.runway.name} as the {one.runway.placed_by} has it, the positions and the touchdown as recorded. "
+        f"{_corrected(one)}{_sigmas(one)}Scales differ.",
         "The runway from above with the recorded positions and the touchdown.",
         one_panel(panel, 30.0),
         ("landing_path",),
@@ -58,6 +59,18 @@ def _rings(one: Approach, end_m: float) -> tuple[np.ndarray, ...]:
         np.array([(low, -half_m), (high, -half_m), (high, half_m), (low, half_m), (low, -half_m)])
         for low, high in edges
     )
+
+
+def _corrected(one: Approach) -> str:
+    """Return where the touchdown was without the error of the positions, if it is known."""
+    found = {row.name: row for row in one.criteria if row.value is not None}
+    past, aside = found.get("touchdown"), found.get("centre_line")
+    recorded_m = None if one.touchdown is None else one.touchdown.past_threshold_m
+    if past is None or past.value is None or aside is None or recorded_m is None:
+        return ""
+    if round(past.value) == round(recorded_m):
+        return ""
+    return f"Corrected, it is {value_text(past)} beyond the threshold, {value_text(aside)} off the centre line. "
 
 
 def _sigmas(one: Approach) -> str:

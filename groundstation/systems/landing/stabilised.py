@@ -10,6 +10,7 @@ from groundstation.results.rules import Rejudged
 from groundstation.systems.landing.answer import (
     GatePlace,
     LandingResult,
+    Side,
     StabilisedAt,
     StabilisedVerdict,
     StabilityLost,
@@ -30,7 +31,10 @@ PERCENT = 100.0
 
 @dataclass(frozen=True, eq=False)
 class Flown:
-    """A quantity along the rows of a check, what is bounded, and why it may be none."""
+    """A quantity along the rows of a check, what is bounded, and why it may be none.
+
+    ``sides`` are those of a negative and a positive value; of a quantity with sides its size is bounded.
+    """
 
     name: str
     title: str
@@ -38,6 +42,16 @@ class Flown:
     values: FloatArray
     is_low_bad: bool = False
     reason: str = "not in the log"
+    sides: tuple[Side, Side] = ("", "")
+
+    @property
+    def bounded(self) -> FloatArray:
+        """Values that the limits bound."""
+        return np.abs(self.values) if any(self.sides) else self.values
+
+    def side_at(self, row: int) -> Side:
+        """Return the side of the value of a row."""
+        return self.sides[int(self.values[row] > 0.0)]
 
 
 @dataclass(frozen=True)
@@ -72,23 +86,24 @@ def _from(
     rows = slice(relative.rows.start + own.start, relative.rows.start + own.stop)
     time_s = path.time_s[rows]
     bounds = criterion_bounds(settings, check_height_m)
-    gates, places, over = [], [], []
+    gates, places = list[Gate](), list[GatePlace]()
+    over = list[tuple[str, np.ndarray, Flown | None]]()
     for one in _flown(path, logged, rows, settings):
         if bounds.get(one.name, (None, None)) == (None, None):
             continue
         gate, row = _judged(one, bounds[one.name], time_s, settings.sustained_s)
         gates.append(gate)
         if row is not None:
-            places.append(_place_of(one.name, path, relative, own.start + row))
+            places.append(GatePlace(one.name, place_at(path, relative, own.start + row), one.side_at(row)))
         if gate.value is not None:
-            over.append((one.title, _is_over(one.values, bounds[one.name])))
+            over.append((one.title, _is_over(one.bounded, bounds[one.name]), one))
     for name, title in (("flap", "landing flap set at"), ("gear", "gear down at")):
         found = set_at(name, path, relative, logged, settings)
         value = None if found.place is None else found.place.height_m
         gates.append(judged_gate(bounds[name], name, title, value, unit="m", reason=found.reason))
         if found.place is not None:
             places.append(GatePlace(name, found.place))
-            over.append((title, time_s < found.place.time_s))
+            over.append((title, time_s < found.place.time_s, None))
     criteria = tuple(gates)
     lost, stable_m = _lost(over, time_s, relative.height_m[own], settings.sustained_s)
     return StabilisedAt(
@@ -109,10 +124,10 @@ def rows_below(relative: RelativeToRunway, check_height_m: float, floor_m: float
 
 def _flown(path: FlightPath, logged: Logged, rows: slice, settings: LandingSettings) -> tuple[Flown, ...]:
     return (
-        Flown("lateral", "course deviation", "dots", np.abs(path.lateral_dots[rows])),
-        Flown("vertical", "glide path deviation", "dots", np.abs(path.vertical_dots[rows])),
+        Flown("lateral", "course deviation", "dots", path.lateral_dots[rows], sides=("left", "right")),
+        Flown("vertical", "glide path deviation", "dots", path.vertical_dots[rows], sides=("low", "high")),
         Flown("sink_rate", "sink rate", "m/s", path.sink_rate_mps[rows]),
-        Flown("bank", "bank", "deg", np.abs(path.bank_deg[rows])),
+        Flown("bank", "bank", "deg", path.bank_deg[rows], sides=("left", "right")),
         _speed(path, logged, rows, settings),
         Flown("thrust", "lowest thrust", "%", PERCENT * logged.thrust_share[rows], is_low_bad=True),
     )
@@ -138,11 +153,12 @@ def _judged(one: Flown, bound: Bound, time_s: FloatArray, for_s: float) -> tuple
     Of a value bounded on both sides it is that which misses a bound the more.
     """
     found = {}
-    if np.isfinite(one.values).sum() >= FEWEST:
+    values = one.bounded
+    if np.isfinite(values).sum() >= FEWEST:
         low, high = bound
-        if high is not None and (worst := worst_sustained(time_s, one.values, for_s)):
+        if high is not None and (worst := worst_sustained(time_s, values, for_s)):
             found[worst.value - high] = worst
-        if low is not None and (worst := worst_sustained(time_s, -one.values, for_s)):
+        if low is not None and (worst := worst_sustained(time_s, -values, for_s)):
             found[low + worst.value] = worst._replace(value=-worst.value)
     if not found:
         return judged_gate(bound, one.name, one.title, None, unit=one.unit, reason=one.reason), None
@@ -155,10 +171,6 @@ def _is_over(values: FloatArray, bound: Bound) -> np.ndarray:
     with np.errstate(invalid="ignore"):
         over = np.zeros(len(values), dtype=bool) if high is None else values > high
         return over if low is None else over | (values < low)
-
-
-def _place_of(name: str, path: FlightPath, relative: RelativeToRunway, row: int) -> GatePlace:
-    return GatePlace(name, place_at(path, relative, row))
 
 
 def place_at(path: FlightPath, relative: RelativeToRunway, row: int) -> Place:
@@ -202,18 +214,22 @@ def set_at(name: str, path: FlightPath, relative: RelativeToRunway, logged: Logg
 
 
 def _lost(
-    over: list[tuple[str, np.ndarray]], time_s: FloatArray, height_m: FloatArray, for_s: float
+    over: list[tuple[str, np.ndarray, Flown | None]], time_s: FloatArray, height_m: FloatArray, for_s: float
 ) -> tuple[StabilityLost | None, float | None]:
     """Return the first loss of a limit, and the height from which all were kept."""
-    spans = [(first, last, title) for title, rows in over for first, last in lasting(time_s, rows, for_s)]
+    spans = [
+        (first, last, title, "" if one is None else one.side_at(first))
+        for title, rows, one in over
+        for first, last in lasting(time_s, rows, for_s)
+    ]
     if not over:
         return None, None
     if not spans:
         return None, float(height_m[0])
-    first, _last, title = min(spans)
-    end = max(last for _first, last, _title in spans)
+    first, _last, title, side = min(spans)
+    end = max(span[1] for span in spans)
     stable_m = float(height_m[end]) if end < len(height_m) and np.isfinite(height_m[end]) else None
-    lost = StabilityLost(float(height_m[first]), float(time_s[first]), title, is_from_the_start=first == 0)
+    lost = StabilityLost(float(height_m[first]), float(time_s[first]), title, first == 0, side)
     return lost, stable_m
 
 

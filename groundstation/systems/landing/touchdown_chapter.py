@@ -4,8 +4,9 @@ from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.chapters.parts import Cell, Facts, Grid, Head, Mark, Part, Tone
-from groundstation.chapters.wording import ABSENT, clock, number, sentence, typeset
+from groundstation.chapters.wording import ABSENT, clock, number, sentence, typeset, with_feet
 from groundstation.systems.landing.answer import Approach
+from groundstation.systems.landing.criteria_chapter import value_text
 from groundstation.systems.landing.touchdown_answer import (
     LAST_SINK_S,
     PEAK_S,
@@ -45,7 +46,7 @@ def _facts(one: Approach, down: Touchdown, start_utc_ns: int | None) -> Facts:
         ("Time", f"{clock(down.time_s)} {_interval(down)}", f"95 %; {by}"),
         *([] if start_utc_ns is None else [("UTC", _utc(start_utc_ns, down.time_s), "")]),
         ("Place", f"{number(down.latitude_deg, 5, '°')}, {number(down.longitude_deg, 5, '°')}", _along(down)),
-        ("Beyond the threshold", number(down.past_threshold_m, 0, "m"), _beyond(one, down)),
+        _beyond(one, down),
         ("Ground speed", number(down.ground_speed_mps, 1, "m/s"), ""),
         ("Sink rate", with_interval(down.sink_rate_mps, down.sink_rate_sigma_mps), _sink_remark(down)),
         ("Peak normal acceleration", number(down.peak_load_g, 2, "g"), PEAK_TIME),
@@ -79,14 +80,15 @@ def _along(down: Touchdown) -> str:
     return f"{told}; ± {number(NORMAL_95 * down.place_sigma_m, 0, 'm')} along the runway by the time (95 %)"
 
 
-def _beyond(one: Approach, down: Touchdown) -> str:
-    """Return how a distance as recorded and that of the criterion go together."""
+def _beyond(one: Approach, down: Touchdown) -> tuple[str, str, str]:
+    """Return the distance beyond the threshold, corrected where the criterion is."""
+    name = "Beyond the threshold"
     if down.past_threshold_m is None:
-        return typeset(one.runway.place_reason)
-    corrected = next((row.value for row in one.criteria if row.name == "touchdown"), None)
-    if corrected is None or round(corrected) == round(down.past_threshold_m):
-        return "as recorded"
-    return f"as recorded; {number(corrected, 0, 'm')} less the error of the positions"
+        return name, ABSENT, typeset(one.runway.place_reason)
+    judged = next((row for row in one.criteria if row.name == "touchdown" and row.value is not None), None)
+    if judged is None:
+        return name, with_feet(down.past_threshold_m), "as recorded"
+    return name, value_text(judged), typeset(judged.reason)
 
 
 def with_interval(value: float | None, sigma: float | None, digits: int = 2, unit: str = "m/s") -> str:

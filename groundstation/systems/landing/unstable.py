@@ -13,6 +13,7 @@ from groundstation.systems.landing.answer import Approach, LandingResult
 from groundstation.systems.landing.settings import LIMITS, LandingSettings
 from groundstation.systems.landing.stabilised import rejudge
 from groundstation.systems.landing.unstable_answer import Decision, JudgedApproach, UnstableApproaches, UnstableShare
+from groundstation.systems.landing.verdict_answer import NOTHING_JUDGED, failed_words
 
 KIND = "landing"
 SHIPPED = ShippedToml("groundstation.systems.landing", "standards", "standard")
@@ -121,9 +122,10 @@ def _approaches(saved: SavedFlight, answer: LandingResult, standard: ApproachSta
         if not verdicts:
             continue
         one = verdicts[place]
-        failed = [gate.title for gate in one.gates_after if gate.state == "failed"]
+        places = approach.stabilised[place].places
+        failed = [failed_words(gate, places) for gate in one.gates_after if gate.state == "failed"]
         is_judged = one.after != "not measured"
-        reason = ", ".join(failed) if is_judged else approach.stabilised[place].reason or "no criterion is in the log"
+        reason = ", ".join(failed) if is_judged else approach.stabilised[place].reason or NOTHING_JUDGED
         found.append(
             JudgedApproach(
                 saved.folder.name,

@@ -23,6 +23,7 @@ from groundstation.systems.landing.settings import LandingSettings
 from groundstation.systems.landing.stabilised import rejudge
 from groundstation.systems.landing.sustained import worst_sustained
 from groundstation.systems.landing.touchdown_chapter import touchdown_parts
+from groundstation.systems.landing.verdict_answer import in_feet_too
 from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight, Table
 
@@ -166,20 +167,41 @@ def test_touchdown_threshold_and_remaining_runway_are_those_flown() -> None:
     assert 2.0 < flare.value < 15.0 and floating.value < flare.value * SECOND_M
 
 
-def test_the_touchdown_tells_its_distance_as_recorded_and_without_the_error_of_the_positions() -> None:
+def touchdown_facts(one: Approach) -> dict[str, tuple[str, str]]:
+    facts = touchdown_parts(one, 1_315_842_233_000_000_000)[0]
+    assert isinstance(facts, Facts)
+    return {str(pair[0]): (str(pair[1]).replace("\u202f", " "), str(pair[2])) for pair in facts.pairs}
+
+
+def test_the_touchdown_is_told_in_utc_and_in_feet_and_without_a_correction_as_recorded() -> None:
     one = approach(flown())
     assert one.touchdown is not None and one.touchdown.past_threshold_m is not None
-    rows = tuple(replace(row, value=100.0) if row.name == "touchdown" else row for row in one.criteria)
+    told = touchdown_facts(one)
+    utc = datetime(2011, 9, 12, 15, 43, 53) + timedelta(seconds=round(one.touchdown.time_s, 1))
+    assert told["UTC"][0] == utc.isoformat(" ", "milliseconds")[:-2]
+    past_m = one.touchdown.past_threshold_m
+    assert touchdown_facts(replace(one, criteria=()))["Beyond the threshold"] == (in_feet_too(past_m), "as recorded")
 
-    def told(some: Approach) -> str:
-        facts = touchdown_parts(some, 1_315_842_233_000_000_000)[0]
-        assert isinstance(facts, Facts) and some.touchdown is not None
-        utc = datetime(2011, 9, 12, 15, 43, 53) + timedelta(seconds=round(some.touchdown.time_s, 1))
-        assert {pair[0]: pair[1] for pair in facts.pairs}["UTC"] == utc.isoformat(" ", "milliseconds")[:-2]
-        return next(str(pair[2]) for pair in facts.pairs if pair[0] == "Beyond the threshold")
 
-    assert told(replace(one, criteria=())) == "as recorded"
-    assert "100\u202fm less the error of the positions" in told(replace(one, criteria=rows))
+def test_a_figure_less_the_error_of_the_positions_leads_and_names_the_recorded_one_beside_it() -> None:
+    off_m = (-250.0, 120.0)
+    recorded = replace(EXACT.recorded, along_m=off_m[0], across_m=off_m[1])
+    one = approach(simulate_approach(replace(EXACT, recorded=recorded)).flight)
+    truth = approach(flown())
+    found = {name: (criterion(one, name), criterion(truth, name)) for name in ("touchdown", "centre_line")}
+    for shown, true in found.values():
+        assert shown.value == pytest.approx(true.value, abs=25.0), "corrected"
+        assert shown.reason.count("corrected: positions less") == 1 and "as recorded" in shown.reason
+    assert one.touchdown is not None and one.touchdown.past_threshold_m is not None
+    assert truth.touchdown is not None and truth.touchdown.past_threshold_m is not None
+    raw_m = one.touchdown.past_threshold_m
+    assert raw_m == pytest.approx(truth.touchdown.past_threshold_m + off_m[0], abs=1.0)
+    value, remark = touchdown_facts(one)["Beyond the threshold"]
+    assert value.startswith(f"{found['touchdown'][0].value:.0f} ± ") and f"{in_feet_too(raw_m)} as recorded" in remark
+    assert "121 m (396 ft) right as recorded" in found["centre_line"][0].reason, "a metre of it was flown"
+    for name in ("aiming_point", "runway_remaining"):
+        assert criterion(one, name).reason.endswith("; corrected")
+        assert criterion(truth, name).reason.endswith(("; corrected", "; as recorded"))
 
 
 def test_nothing_is_said_of_a_threshold_that_the_positions_placed() -> None:

@@ -1,5 +1,6 @@
 """The chapter, the figures and the tab of the approaches: what they show is what the answer holds."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,16 +8,24 @@ import numpy as np
 import pytest
 
 from groundstation.chapters.markdown import markdown
+from groundstation.chapters.parts import Grid
+from groundstation.chapters.wording import sentence
+from groundstation.plots.marks import Curve, Dots
+from groundstation.plots.plot import Panel
 from groundstation.reports.drawing import Drawing, drawn_by
 from groundstation.results.answer import by_analysis
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.gates import GateState
 from groundstation.simulation.approach import load_approach, simulate_approach
-from groundstation.systems.landing.answer import LandingResult, StabilisedAt, StabilityLost
+from groundstation.systems.landing.analysis import LANDING
+from groundstation.systems.landing.answer import GatePlace, LandingResult, StabilisedAt, StabilityLost
 from groundstation.systems.landing.chapter import landing
+from groundstation.systems.landing.criteria_answer import Place
+from groundstation.systems.landing.plots import deviations
 from groundstation.systems.landing.stabilised import decide
+from groundstation.systems.landing.verdict_answer import verdict_words
 from tests.recording_contents import Contents
-from tests.systems.landing.test_approaches import found, site
+from tests.systems.landing.test_approaches import EXACT, PLAIN, found, site
 from tests.told import PLOTS, write_recording
 
 SCENARIO = load_approach("ils-approach")
@@ -69,22 +78,46 @@ def test_a_verdict_says_what_it_rests_on(with_site: FlightResults) -> None:
     empty = tuple(replace(one, state="not_measured") for one in high.gates)
     said = claimed(with_site, high=replace(high, gates=empty, verdict=decide(empty)), low=partly)
     assert said == (
-        "From 305 m (1000 ft): not measured (no criterion is in the log). "
-        "From 152 m (500 ft): stabilised (2 of 7 criteria judged)."
+        "Stabilised from 152 m (500 ft): 2 held, 5 not judged. "
+        "Not measured from 305 m (1000 ft), no criterion is in the log."
     )
     reason = "the straight final begins at 200 m"
     failed = tuple(replace(one, state="failed", value=9.3) if one.name == "bank" else one for one in gates)
-    not_stabilised = replace(low, gates=failed, verdict=decide(failed))
+    not_stabilised = replace(
+        low, gates=failed, verdict=decide(failed), places=(GatePlace("bank", Place(1000.0), "left"),)
+    )
+    unmeasured = StabilisedAt(high.height_m, "not measured", None, (), reason)
     said = claimed(
         with_site,
-        high=StabilisedAt(high.height_m, "not measured", None, (), reason),
+        high=unmeasured,
         low=replace(not_stabilised, lost=StabilityLost(152.4, 1000.0, "bank", is_from_the_start=True)),
     )
-    first = f"From 305 m (1000 ft): not measured ({reason}). "
-    assert said == first + "From 152 m (500 ft): not stabilised (bank, worst 9.3°)."
+    rest, counts = f" Not measured from 305 m (1000 ft), {reason}.", "1 failed, 2 held, 4 not judged"
+    assert said == f"Outside limits at 152 m (500 ft), bank up to 9.3° left: {counts}.{rest}"
     left = replace(not_stabilised, lost=StabilityLost(83.8, 1010.0, "bank", is_from_the_start=False))
-    said = claimed(with_site, high=StabilisedAt(high.height_m, "not measured", None, (), reason), low=left)
-    assert said == first + "Within the limits at 152 m (500 ft), left at 84 m (275 ft) (bank, worst 9.3°)."
+    said = claimed(with_site, high=unmeasured, low=left)
+    assert said == f"Within limits at 152 m (500 ft), left at 84 m (275 ft), bank up to 9.3° left: {counts}.{rest}"
+
+
+@pytest.mark.parametrize(("above_path_m", "side"), [(120.0, "high"), (-60.0, "low")])
+def test_terminal_findings_page_and_table_say_one_thing_with_its_side(above_path_m: float, side: str) -> None:
+    flown = replace(PLAIN, flown=replace(PLAIN.flown, above_path_m=above_path_m), recorded=EXACT)
+    flight, where = simulate_approach(flown).flight, site(flown)
+    run = found(flight, where, established_vertical_dots=2.0)
+    (one,) = run.answer.approaches
+    told = "; ".join(verdict_words(one.stabilised))
+    assert re.search(rf"glide path up to \d\.\d dots {side}(, .*)?: \d failed, \d held, \d not judged", told)
+    assert LANDING.sentence(by_analysis(run.answer)).endswith(told)
+    (finding,) = (finding for finding in run.findings if finding.code == "landing.not_stabilised")
+    assert finding.text == f"approach 1 not stabilised: {told}"
+    section = landing(replace(results(True), answers=by_analysis(run.answer), figures=run.answer.figures))
+    assert section is not None and section.claim is not None
+    assert section.claim.sentences[0] == " ".join(sentence(part) for part in verdict_words(one.stabilised))
+    grids = [part for part in section.parts if isinstance(part, Grid) and "not stabilised" in part.title]
+    values = [str(row[2]) for grid in grids for row in grid.rows if row[1] == "Glide path deviation"]
+    assert values and all(value.endswith(f"dots {side}") for value in values)
+    sides = {place.side for at in one.stabilised for place in at.places if place.name == "vertical"}
+    assert sides == {side} == {at.lost.side for at in one.stabilised if at.lost is not None}
 
 
 def test_limits_on_the_page_are_those_of_the_settings(with_site: FlightResults) -> None:
@@ -95,6 +128,37 @@ def test_limits_on_the_page_are_those_of_the_settings(with_site: FlightResults) 
     assert section is not None
     text = markdown(section).replace("\u202f", " ")
     assert "down to 45 m" in text and "within 0.75 dot of the course and 1 dot of the path" in text
+
+
+@pytest.mark.parametrize(("along_m", "across_m"), [(-300.0, 150.0), (400.0, -80.0)])
+def test_the_figure_of_deviations_says_by_how_much_its_dots_are_off_the_line(along_m: float, across_m: float) -> None:
+    scenario = replace(PLAIN, recorded=replace(EXACT, along_m=along_m, across_m=across_m))
+    answer = found(simulate_approach(scenario).flight, site(scenario)).answer
+    told = replace(results(True), answers=by_analysis(answer), figures=answer.figures)
+    plot = deviations(told, "1")
+    assert plot is not None
+    lateral, vertical = (row.panels[0] for row in plot.rows)
+
+    def apart_m(panel: Panel) -> float:
+        """Dots less the line, near the threshold."""
+        (dots,) = (mark for mark in panel.marks if isinstance(mark, Dots))
+        (line,) = (mark for mark in panel.marks if isinstance(mark, Curve))
+        near = (np.asarray(dots.x) > 0.0) & (np.asarray(dots.x) < 1.0)
+        return float(np.nanmedian((np.asarray(dots.y) - np.asarray(line.y))[near]))
+
+    told = re.search(
+        r"(\d+) m (left|right) of where .* and (\d+) m (ahead|behind).* by ([−+]\d+) m at the threshold",
+        plot.caption.replace("\u202f", " "),
+    )
+    assert told is not None
+    assert told[2] == ("right" if across_m > 0.0 else "left") and told[4] == ("ahead" if along_m > 0.0 else "behind")
+    assert float(told[1]) == pytest.approx(abs(across_m), abs=5.0)
+    assert apart_m(lateral) == pytest.approx(across_m, abs=5.0)
+    assert float(told[3]) == pytest.approx(abs(along_m), abs=100.0), (
+        "the antenna's height is some 60 m along the course"
+    )
+    found_height = float(told[5].replace("−", "-"))
+    assert apart_m(vertical) == pytest.approx(found_height, abs=5.0), "the height of the antenna is 3 m of it"
 
 
 def test_every_figure_is_drawn(with_site: FlightResults) -> None:

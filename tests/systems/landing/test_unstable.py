@@ -50,7 +50,7 @@ def test_shares_by_runway_and_aircraft_with_wilsons_interval(stable: LandingResu
     assert (whole.judged, whole.unstable) == (3, 1) and (whole.low, whole.high) == wilson_interval(1, 3)
     assert runway.name == "09" and (first.name, first.unstable, first.judged) == ("A", 1, 2)
     assert (second.name, second.unstable) == ("B", 0)
-    assert found.decision == "no limit" and "glide path deviation" in found.approaches[1].reason
+    assert found.decision == "no limit" and "dots high" in found.approaches[1].reason
 
 
 def test_a_limit_is_decided_by_the_whole_interval(stable: LandingResult, unstable: LandingResult) -> None:
