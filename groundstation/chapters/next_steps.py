@@ -6,6 +6,7 @@ them stands here. A signal that the log has is not asked for.
 
 from collections.abc import Iterator
 
+from groundstation.base.signals import topics_of_kind
 from groundstation.base.words import listed
 from groundstation.chapters.chapter import Advice, Chapters, Remedies
 from groundstation.chapters.held_signals import without_held
@@ -21,8 +22,11 @@ BY_REASON: Remedies = (
     ("expected at least 300 s", ("Fly", "5 min or more with INS and GNSS")),
     ("GNSS never had a fix", ("Check", "the GNSS antenna, its cable and its sky")),
     ("no GNSS velocity", ("Record", "GNSS velocity")),
-    ("no INS position", ("Record", "INS position")),
     ("no GNSS position", ("Record", "GNSS position")),
+)
+# The same of what only an INS gives: of no use beside an inertial unit or a receiver without one.
+BY_REASON_OF_AN_INS: Remedies = (
+    ("no INS position", ("Record", "INS position")),
     ("no INS heading", ("Record", "INS heading")),
 )
 LOST = "the recorder: data were lost"
@@ -65,6 +69,8 @@ def _advice(results: FlightResults, chapters: Chapters) -> Iterator[Advice]:
     yield from (advice for advice in given if advice.is_danger)
     yield from (advice for advice in given if advice.is_pressing and not advice.is_danger)
     remedies = [*(remedy for one in chapters.advisers for remedy in one.remedies), *BY_REASON]
+    if not results.ledger.topics or topics_of_kind("ins", results.ledger.topics):
+        remedies += BY_REASON_OF_AN_INS
     for one in results.not_assessable:
         purpose = chapters.titles.get(one.analysis, one.analysis)
         purpose = purpose if purpose.startswith("INS") else purpose[:1].lower() + purpose[1:]

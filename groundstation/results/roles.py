@@ -258,6 +258,11 @@ class StatesAlongTheFlight:
     states_name: ClassVar[str]
 
     @property
+    def unit_topic(self) -> str:
+        """Topic of the inertial unit it rests on."""
+        raise NotImplementedError
+
+    @property
     def gnss_topic(self) -> str:
         """Topic of the receiver it rests on."""
         raise NotImplementedError

@@ -402,6 +402,16 @@ def test_a_log_without_a_compass_is_not_asked_for_a_magnetometer(field: str, is_
     assert ("magnetometer" in str(section)) == is_asked
 
 
+@pytest.mark.parametrize(
+    ("topics", "is_asked"), [(("imu", "gnss"), False), (("gnss",), False), (("ins", "gnss"), True)]
+)
+def test_what_only_an_ins_gives_is_asked_of_a_log_with_one(topics: tuple[str, ...], is_asked: bool) -> None:
+    missing = NotAssessable("heading", "no INS heading in the log"), NotAssessable("inertial", "no INS position in ins")
+    ledger = Ledger(topics={name: topic(10.0, 80.0, "latitude_deg") for name in topics})
+    section = next_steps(example(heading_result(gates=()), ledger=ledger, not_assessable=missing))
+    assert (section is not None) == is_asked and ("INS heading" in str(section)) == is_asked
+
+
 def test_advice_for_two_answers_is_told_once() -> None:
     missing = tuple(NotAssessable(name, "GNSS never had a fix") for name in ("heading", "trajectory"))
     section = next_steps(example(not_assessable=missing))

@@ -137,7 +137,7 @@ def test_places_in_radians_as_the_angles(write: Write) -> None:
     cells = (f"{t},{0.96 + 1e-6 * t:.8f},{0.65 + 1e-6 * t:.8f},{0.3 * t % 6.28:.3f}" for t in range(40))
     at = write("a.csv", table("time_s,lat,lon,yaw", *cells))
     profile, text = drafted(at)
-    assert text.count("radians, as the angles") == 2
+    assert text.count("radians, as the angles") == 1 and "# ? lat, lon: " in text
     assert Read(at, profile).values("gnss", "latitude_deg")[0] == pytest.approx(55.0039483, abs=1e-7)
 
 
@@ -159,6 +159,18 @@ def test_the_matrix_of_a_position_of_a_robot(write: Write) -> None:
         read.values("gnss", name)[0] for name in ("position_east_sigma_m", "position_north_sigma_m", "vertical_sigma_m")
     ]
     assert found == pytest.approx([0.2, 0.3, 0.5])
+
+
+def test_a_doubt_that_columns_share_is_told_once_and_goes_with_one_line(write: Write) -> None:
+    cells = (f"{10 * n},0.01,-0.02,1.0,{n % 7},{-(n % 5)},{n % 3}" for n in range(300))
+    at = write("a.csv", table("time_ms,ax,ay,az,gx,gy,gz", *cells))
+    profile, text = drafted(at)
+    marks = [line for line in text.splitlines() if "? " in line]
+    assert text.count("z reads +1 g") == 1 and text.count("degrees per second assumed") <= 1
+    assert marks[0].startswith("# ? ax, ay, az, gx, gy, gz: z reads +1 g")
+    assert Read(at, profile).remarks["unchecked_draft"].text.count("z reads +1 g") == 1
+    profile.write_text("\n".join(line for line in text.splitlines() if line not in marks))
+    assert "unchecked_draft" not in Read(at, profile).remarks
 
 
 def test_question_marks_of_a_draft_are_told_until_they_are_taken_away(write: Write) -> None:

@@ -1,5 +1,6 @@
 """Guess of what a column of a table becomes, as a line of a draft."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from groundstation.base.toml_text import quoted
@@ -33,6 +34,10 @@ class ColumnGuess:
     @property
     def line(self) -> str:
         """The line of the draft."""
+        return self.line_with(self.doubt)
+
+    def line_with(self, doubt: str) -> str:
+        """Return the line with this doubt in place of its own."""
         scale = f", scale = {self.scale:g}" * (self.scale != 1.0)
         sign = ", sign = -1" * (self.sign < 0)
         unit = f", unit = {quoted(self.unit)}" * bool(self.unit)
@@ -50,10 +55,19 @@ class ColumnGuess:
         missing = f", missing = [{', '.join(self.missing)}]" * bool(self.missing)
         said = f"{unit}{scale}{sign}{offset}{north}{variance}{side}{missing}"
         entry = f"{quoted(self.name)} = {{ field = {quoted(self.target)}{said} }}"
-        notes = "; ".join(filter(None, (self.values, self.why, f"? {self.doubt}" if self.doubt else "")))
+        notes = "; ".join(filter(None, (self.values, self.why, f"? {doubt}" if doubt else "")))
         return f"{entry}  # {notes}" if notes else entry
 
 
 def both(one: str, other: str) -> str:
     """Return two doubts as one."""
     return "; ".join(filter(None, (one, other)))
+
+
+def columns_in_doubt(columns: Iterable[ColumnGuess]) -> dict[str, tuple[str, ...]]:
+    """Return each doubt by itself, and the names of the columns that have it."""
+    found: dict[str, tuple[str, ...]] = {}
+    for column in columns:
+        for doubt in filter(None, column.doubt.split("; ")):
+            found[doubt] = (*found.get(doubt, ()), column.name)
+    return found

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from groundstation.readers.drafts.column import ColumnGuess
+from groundstation.readers.drafts.column import ColumnGuess, columns_in_doubt
 from groundstation.readers.drafts.guesses import Guesses
 from groundstation.readers.drafts.sample import sample_of
 from groundstation.readers.drafts.time_guess import TimeGuess
@@ -52,11 +52,8 @@ class Draft:
     def doubts(self) -> tuple[str, ...]:
         """Lines that tell what the user has to look at."""
         told = [f"time: {self.time.doubt}"] if self.time.doubt else []
-        names: dict[str, list[str]] = {}  # columns of one doubt, which is told once
-        for one in self.columns:
-            if one.doubt:
-                names.setdefault(one.doubt, []).append(one.name)
-        return (*told, *(f"{', '.join(of)}: {doubt}" for doubt, of in names.items()))
+        each = columns_in_doubt(self.columns)
+        return (*told, *(f"{', '.join(of)}: {doubt}" for doubt, of in each.items()))
 
 
 @np.errstate(all="ignore")  # a table may hold any number

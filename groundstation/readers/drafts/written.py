@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from groundstation.base.toml_text import quoted
-from groundstation.readers.drafts.column import ColumnGuess
+from groundstation.readers.drafts.column import ColumnGuess, columns_in_doubt
 from groundstation.readers.drafts.sample import TableSample
 from groundstation.readers.drafts.time_guess import TimeGuess
 
@@ -36,7 +36,7 @@ def written(sample: TableSample, time: TimeGuess, columns: Sequence[ColumnGuess]
             *_variation(sample, used),
             "",
             "[columns]",
-            *(_comment_line(one.line) for one in used),
+            *_lines(used),
             *_derived(used),
             *_rest(left),
             "",
@@ -88,6 +88,16 @@ def _variation(sample: TableSample, used: Sequence[ColumnGuess]) -> Iterator[str
     at = next((at for at, one in enumerate(sample.meanings) if one is not None and one.role == "variation"), None)
     if at is not None and any(one.north for one in used):
         yield from ("", "[variation]  # ? positive east assumed", f"column = {quoted(sample.names[at])}")
+
+
+def _lines(used: Sequence[ColumnGuess]) -> Iterator[str]:
+    """Yield the lines of the columns; a doubt that several share has one line, above the first of them."""
+    doubts = columns_in_doubt(used)
+    for one in used:
+        own = [doubt for doubt, names in doubts.items() if names == (one.name,)]
+        shared = [doubt for doubt, names in doubts.items() if len(names) > 1 and names[0] == one.name]
+        yield from (_comment(f"# ? {', '.join(doubts[doubt])}: {doubt}") for doubt in shared)
+        yield _comment_line(one.line_with("; ".join(own)))
 
 
 def _derived(used: Sequence[ColumnGuess]) -> Iterator[str]:

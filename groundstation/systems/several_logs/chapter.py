@@ -3,9 +3,14 @@
 How each was put on the flight's clock, and which sources are used.
 """
 
+from dataclasses import dataclass
+
+from groundstation.base.quantiles import NORMAL_95
+from groundstation.base.words import with_half
 from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section
 from groundstation.chapters.wording import number, typeset
 from groundstation.results.flight import FlightResults
+from groundstation.results.roles import StatesAlongTheFlight
 from groundstation.systems.several_logs.answer import JoinedLog, JoinedStretch, JoinMethod, Together
 
 TITLE = "Logs of this flight"
@@ -55,16 +60,57 @@ def together(results: FlightResults) -> Section | None:
             Facts("", [(f"Difference in {one.signal} of {source.topic} and {source.reference_topic}", left, of)])
         )
         parts.append(Figure("together.motion", one.label))
-    claim = _claim(answer)
+    claim = _claim(answer, seen := _seen_by_motion(results, answer))
+    if seen is not None:
+        parts.insert(1, Note(seen.sentence, "good"))
     return Section("together", TITLE, LEAD, tuple(parts), claim.headline, claim=claim)
 
 
-def _claim(answer: Together) -> Claim:
+@dataclass(frozen=True)
+class _Seen:
+    """Times of two logs that file time alone places, and how far their motion shows them apart."""
+
+    apart: str
+    sentence: str
+
+
+def _seen_by_motion(results: FlightResults, answer: Together) -> _Seen | None:
+    """Return how well the clocks agree, by the GNSS latency of a trajectory over both logs.
+
+    None where it is another log, or several, that file time alone places, and where no trajectory shows it.
+    """
+    found = results.answer_meeting(StatesAlongTheFlight)
+    latency = None if found is None or not found.is_reference else found.gnss_latency
+    unknown = [log for log in answer.logs if log.method == "file_time"]
+    if found is None or latency is None or len(unknown) != 1:
+        return None
+    unit, gnss = (_log_of(answer, topic) for topic in (found.unit_topic, found.gnss_topic))
+    if unit is gnss or unknown[0] not in (unit, gnss):
+        return None
+    size = typeset(with_half(abs(latency[0]), NORMAL_95 * latency[1], "s"))
+    apart = f"{size} {'later' if latency[0] > 0.0 else 'earlier'}"
+    text = (
+        f"By the motion that both show, GNSS times of {gnss.source_name} are {apart} than those of {unit.source_name} "
+        "(95 %), the receiver's delay included: it is the GNSS latency of the trajectory, which takes it off."
+    )
+    return _Seen(apart, text)
+
+
+def _log_of(answer: Together, topic: str) -> JoinedLog:
+    """Return the log that a topic of the flight comes from."""
+    labelled = (log for log in answer.logs if log.label and topic.endswith(f".{log.label}"))
+    return next(labelled, next(log for log in answer.logs if not log.label))
+
+
+def _claim(answer: Together, seen: _Seen | None) -> Claim:
     others = [log for log in answer.logs if log.method != "own_clock"]
     widths = [one.largest_half_width95_s for log in others for one in log.stretches]
     known = [width for width in widths if width is not None]
     if len(known) < len(widths):
         mark, headline = Mark("warn", "By file time"), "it is not known how well the clocks agree"
+        if seen is not None:
+            mark = Mark("good", "Joined")
+            headline = f"{len(answer.logs)} logs by file time: GNSS {seen.apart} by the motion, and taken off"
     else:
         worst = max(known, default=0.0)
         mark = Mark("good", "Joined") if worst <= GOOD_S else Mark("warn", "Joined roughly")

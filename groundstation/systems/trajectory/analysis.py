@@ -34,10 +34,10 @@ def _has_unit(flight: "Flight", _known: Known) -> bool:
 
 
 def _sentence(answers: Answers) -> str:
-    from groundstation.systems.trajectory.wording_answer import sentence_of
+    from groundstation.systems.trajectory.wording_answer import line_of
 
     answer = answer_of(answers, BestTrajectory)
-    return "" if answer is None else sentence_of(answer)
+    return "" if answer is None else line_of(answer)
 
 
 TRAJECTORY = Analysis(

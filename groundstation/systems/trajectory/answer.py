@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.results.answer import Answer
 from groundstation.results.arrays.states import BodyStates
 from groundstation.results.arrays.typed import found_in
@@ -32,6 +33,7 @@ MountingSource = Literal["stated", "logged", "found", "case"]
 ARM = ("antenna forward of the unit", "antenna right of the unit", "antenna down of the unit")
 TRAVEL = ("travel in the unit, yaw", "travel in the unit, pitch")
 LATENCY, VELOCITY_LAG = "GNSS latency", "GNSS velocity behind its position"
+STARTED_BY_SEARCH = ("latency", "mounting")  # groups of parameters whose first value is not zero
 
 
 @dataclass(frozen=True)
@@ -113,9 +115,9 @@ class NoiseRow:
 
 @dataclass(frozen=True)
 class TrajectoryParameter:
-    """Parameter that the log itself shows: value, sigma, and the sigma it started with.
+    """Parameter of the model: value, sigma, and the sigma it started with.
 
-    ``is_observable`` is false where the data say nothing of it. ``group`` is the name without its axis: "gyro bias".
+    ``is_observable`` is false where the data hardly narrow it. ``group`` is the name without its axis: "gyro bias".
     """
 
     name: str
@@ -125,6 +127,12 @@ class TrajectoryParameter:
     sigma: float
     start_sigma: float
     is_observable: bool
+
+    @property
+    def is_far(self) -> bool:
+        """Tell whether it is not observable and yet beyond the 95 % assumed at first: coupled with others."""
+        starts_at_zero = self.group not in STARTED_BY_SEARCH
+        return starts_at_zero and not self.is_observable and abs(self.value) > NORMAL_95 * self.start_sigma
 
 
 @dataclass(frozen=True)
@@ -224,6 +232,11 @@ class BestTrajectory(Answer, StatesAlongTheFlight, ErrorsOfFilter):
     def parameter(self, name: str) -> TrajectoryParameter | None:
         """Return the parameter of a name, None where the model has none."""
         return next((one for one in self.parameters if one.name == name), None)
+
+    @property
+    def unit_topic(self) -> str:
+        """Topic of the inertial unit it rests on."""
+        return self.imu
 
     @property
     def gnss_topic(self) -> str:

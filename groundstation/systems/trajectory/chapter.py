@@ -1,5 +1,6 @@
 """Chapter on the best trajectory: doubt first, then the on-board filter and the accuracy."""
 
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.words import places_of, with_half
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.gates import gate_grid
@@ -347,10 +348,17 @@ def _parameters(answer: BestTrajectory) -> Grid | None:
     if not answer.parameters:
         return None
     heads = (
-        *(Head("Parameter"), Head("Value, ± 95 %", True), Head("σ at first", True)),
+        *(Head("Parameter"), Head("Value, ± 95 %", True), Head("Assumed at first, 95 %", True)),
         Head("Observable"),
     )
-    caption = "Values at the end of the log, in the axes of the body. What is not observable is as it was assumed."
+    caption = "Values at the end of the log, in the axes of the body."
+    if any(not one.is_observable and not one.is_far for one in answer.parameters):
+        caption += " Not observable: the log hardly narrows what was assumed, and no value is told."
+    if any(one.is_far for one in answer.parameters):
+        caption += (
+            " Not by itself: the log asks for more than was assumed and hardly narrows it. It shows a sum with others, "
+            "such as scale and bias of one axis: do not use the value alone."
+        )
     if any(one.name in TRAVEL for one in answer.parameters):
         caption += " Travel in the unit: direction in which the vehicle goes straight on, right and up of the unit."
     return Grid("Parameters found", heads, [_parameter(one) for one in answer.parameters], caption)
@@ -358,8 +366,10 @@ def _parameters(answer: BestTrajectory) -> Grid | None:
 
 def _parameter(row: TrajectoryParameter) -> tuple[Cell, ...]:
     mark = Mark("good", "yes") if row.is_observable else Mark("unknown", "no")
-    value = _signed(row.value, 1.96 * row.sigma, row.unit)
-    return _capital(row.name), value, _with(row.start_sigma, row.unit), mark
+    mark = Mark("warn", "not by itself") if row.is_far else mark
+    is_told = row.is_observable or row.is_far
+    value = _signed(row.value, NORMAL_95 * row.sigma, row.unit) if is_told else ABSENT
+    return _capital(row.name), value, f"± {_with(NORMAL_95 * row.start_sigma, row.unit)}", mark
 
 
 def _noise(answer: BestTrajectory) -> Grid | None:

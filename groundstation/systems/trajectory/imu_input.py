@@ -48,12 +48,18 @@ def imu_of(flight: Flight, settings: InputSettings) -> ImuInput:
     clipped, saturated = ends_of_range(samples, notes)
     timed = timed_on_lines(samples, settings)
     notes += timed.notes
-    imu, bridged_s, gaps_s = touching_increments(timed, settings)
+    imu, bridged, gaps_s = touching_increments(timed, settings)
     if len(imu) < FEWEST:
         raise NotAssessableError(SUBJECT, f"{topic} has only {counted(len(imu), 'usable sample')}")
-    if bridged_s > BRIDGED_SHARE * float(imu.interval_s.sum()):
-        text = f"samples of {topic} are missing in steps below {settings.gap_s:g} s, {bridged_s:.1f} s in all: bridged"
-        notes.append(InputNote("bridged", text))
+    least_s = BRIDGED_SHARE * float(imu.interval_s.sum())
+    if samples.repeats_after is not None:
+        count = int(samples.repeats_after.sum())
+        where = f", the {bridged.repeats_s:.1f} s that they stood for bridged" if bridged.repeats_s > least_s else ""
+        text = f"{counted(count, 'sample')} of {topic} repeat{'s' * (count == 1)} the one before: left out{where}"
+        notes.append(InputNote("duplicates", text, count))
+    if bridged.missing_s > least_s:
+        text = f"samples of {topic} are missing in steps below {settings.gap_s:g} s, {bridged.missing_s:.1f} s in all"
+        notes.append(InputNote("bridged", f"{text}: bridged"))
     if gaps_s.size:
         text = (
             f"{counted(gaps_s.size, 'gap')} of {topic}, {gaps_s.sum():.1f} s in all, the longest {gaps_s.max():.2f} s"
@@ -66,7 +72,7 @@ def imu_of(flight: Flight, settings: InputSettings) -> ImuInput:
         rate_hz,
         timed.jitter_s,
         timed.jitter_max_s,
-        bridged_s,
+        bridged.missing_s + bridged.repeats_s,
         int(gaps_s.size),
         float(gaps_s.max(initial=0.0)),
         clipped,

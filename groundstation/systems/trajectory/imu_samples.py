@@ -30,12 +30,14 @@ class UnitSamples:
     """Samples in the order in which the unit made them.
 
     ``rates`` has rates in rad/s and specific force, shape (n, 6); ``interval_s`` is None where they are point samples.
+    ``repeats_after``: samples left out just behind each, that repeat it.
     """
 
     time_s: FloatArray
     rates: FloatArray
     interval_s: FloatArray | None
     clipped: BoolArray
+    repeats_after: NDArray[np.int64] | None = None
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -43,7 +45,8 @@ class UnitSamples:
     def take(self, rows: NDArray[np.intp] | BoolArray | slice) -> "UnitSamples":
         """Return some of the samples."""
         interval_s = None if self.interval_s is None else self.interval_s[rows]
-        return UnitSamples(self.time_s[rows], self.rates[rows], interval_s, self.clipped[rows])
+        repeats = None if self.repeats_after is None else self.repeats_after[rows]
+        return UnitSamples(self.time_s[rows], self.rates[rows], interval_s, self.clipped[rows], repeats)
 
 
 def fields_of(table: Table) -> tuple[str, ...]:
@@ -76,7 +79,7 @@ def samples_of(flight: Flight, topic: str, settings: InputSettings, notes: list[
     if fields == SAMPLES:
         notes.append(InputNote("point_samples", f"{topic} has point samples: what happens between them is not known"))
         values[:, :3] /= DEG_PER_RAD
-        return _without_repeats(UnitSamples(time_s, values, None, clipped), topic, notes), False
+        return _without_repeats(UnitSamples(time_s, values, None, clipped)), False
     return _integrated(UnitSamples(time_s, values, None, clipped), table, settings, notes)
 
 
@@ -137,7 +140,7 @@ def _integrated(
     if not told.all():
         text = f"{counted(int(np.count_nonzero(~told)), 'increment')} without an interval: {1e3 * usual_s:.3g} ms taken"
         notes.append(InputNote("assumed_interval", text, int(np.count_nonzero(~told))))
-    found = _without_repeats(found, table.topic, notes)
+    found = _without_repeats(found)
     assert found.interval_s is not None
     step = np.diff(found.time_s)
     near = np.abs(step) <= settings.segment_s  # jitter cancels
@@ -162,7 +165,7 @@ def _usual_interval(time_s: FloatArray, interval_s: FloatArray) -> float:
     return max(float(np.median((ordered[window:] - ordered[:-window]) / window)), 1e-6)
 
 
-def _without_repeats(samples: UnitSamples, topic: str, notes: list[InputNote]) -> UnitSamples:
+def _without_repeats(samples: UnitSamples) -> UnitSamples:
     """Drop samples that the log has twice.
 
     They have the same stamp and values; or the same values, where the log holds many.
@@ -180,10 +183,10 @@ def _without_repeats(samples: UnitSamples, topic: str, notes: list[InputNote]) -
     drop = at_once
     if np.mean(held) > max(REPEATED_SHARE, 3.0 * by_chance):
         drop = same & ~_long_runs(same)
-    count = int(np.count_nonzero(drop))
-    if count:
-        notes.append(InputNote("duplicates", f"{counted(count, 'sample')} of {topic} logged twice: left out", count))
-    return samples.take(~drop) if count else samples
+    if not drop.any():
+        return samples
+    kept = np.flatnonzero(~drop)  # the first sample is always kept
+    return replace(samples.take(kept), repeats_after=np.diff(np.append(kept, len(drop))) - 1)
 
 
 def _long_runs(same: BoolArray, longest: int = 20) -> BoolArray:

@@ -83,6 +83,7 @@ def _joined(pieces: list[UnitSamples]) -> UnitSamples:
         np.concatenate([one.rates for one in pieces]),
         None if pieces[0].interval_s is None else np.concatenate([_of(one) for one in pieces]),
         np.concatenate([one.clipped for one in pieces]),
+        None if pieces[0].repeats_after is None else np.concatenate([_repeats(one) for one in pieces]),
     )
 
 
@@ -91,14 +92,27 @@ def _of(samples: UnitSamples) -> FloatArray:
     return samples.interval_s
 
 
+def _repeats(samples: UnitSamples) -> NDArray[np.int64]:
+    assert samples.repeats_after is not None
+    return samples.repeats_after
+
+
 def _increasing(time_s: FloatArray, end_s: float) -> BoolArray:
     """Tell which times are later than all before."""
     before = np.maximum.accumulate(np.concatenate(([end_s], time_s[:-1])))
     return np.asarray(time_s > before)
 
 
-def touching_increments(timed: TimedSamples, settings: InputSettings) -> tuple[ImuIncrements, float, FloatArray]:
-    """Return increments over intervals that touch, seconds bridged in them, and gaps.
+@dataclass(frozen=True)
+class Bridged:
+    """Seconds bridged for samples that are missing, and for those left out that repeat the one before."""
+
+    missing_s: float
+    repeats_s: float
+
+
+def touching_increments(timed: TimedSamples, settings: InputSettings) -> tuple[ImuIncrements, Bridged, FloatArray]:
+    """Return increments over intervals that touch, what is bridged in them, and gaps.
 
     Point samples stand for the interval since the sample before, by the trapezoid. An increment behind a lost one takes
     its interval too, at the mean of the rates either side. Behind a gap an interval has its usual length.
@@ -125,12 +139,16 @@ def touching_increments(timed: TimedSamples, settings: InputSettings) -> tuple[I
         late = np.flatnonzero(missing_s)
         integrals[late] += 0.5 * (samples.rates[late - 1] + samples.rates[late]) * missing_s[late, None]
     late_s = np.where(is_gap, 0.0, interval_s - own_s)
-    bridged_s = float(late_s[late_s > MISSING * np.minimum(usual_s, own_s)].sum())
+    is_bridged = late_s > MISSING * np.minimum(usual_s, own_s)
+    by_repeats = np.zeros(count, dtype=bool)
+    if samples.repeats_after is not None:
+        by_repeats[1:] = samples.repeats_after[:-1] > 0
+    bridged = Bridged(float(late_s[is_bridged & ~by_repeats].sum()), float(late_s[is_bridged & by_repeats].sum()))
     gaps_s = (step_s - own_s)[1:][is_gap[1:]]
     imu = ImuIncrements(
         samples.time_s, interval_s, integrals[:, :3], integrals[:, 3:], is_integral=samples.interval_s is not None
     )
-    return imu, bridged_s, gaps_s
+    return imu, bridged, gaps_s
 
 
 def _usual_steps(step_s: FloatArray, starts: tuple[int, ...], count: int) -> FloatArray:

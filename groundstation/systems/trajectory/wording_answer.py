@@ -38,6 +38,23 @@ def accuracy_words(answer: BestTrajectory) -> str:
     return f"{', '.join(told)} (95 %)"
 
 
+def line_of(answer: BestTrajectory) -> str:
+    """Return the sentence of a line on the terminal: where it tells accuracy, whose attitude that is comes first."""
+    told = sentence_of(answer)
+    is_accuracy = answer.state == "accepted" and told == accuracy_words(answer)
+    return f"{whose}: {told}" if is_accuracy and (whose := whose_words(answer)) else told
+
+
+def whose_words(answer: BestTrajectory) -> str:
+    """Return in short whose attitude it is, where it is not that of the vehicle; empty else."""
+    mounting = answer.mounting
+    if mounting.source == "case":
+        return "attitude of the unit's case, not of the vehicle"
+    if mounting.off_deg is None or mounting.to_state_deg is None:
+        return ""
+    return f"attitude of the unit, {mounting.off_deg:.1f} deg off the vehicle's"
+
+
 def axes_words(answer: BestTrajectory) -> str:
     """Return whose attitude it is, where it is not that of the vehicle; empty else."""
     mounting = answer.mounting

@@ -301,6 +301,29 @@ def test_held_samples_are_dropped() -> None:
     assert found.imu_facts.rate_hz == pytest.approx(50.0, rel=1e-3)
 
 
+def test_repeats_among_samples_and_what_is_bridged_for_them_are_one_count_in_one_sentence() -> None:
+    time_s = imu_times()
+    rows = np.arange(len(time_s))
+    rows[rows % 20 == 10] -= 1
+    made = samples(time_s)
+    columns = {name: column.take(rows) for name, column in made.columns.items()}
+    found = gathered(replace(made, columns=columns), fixes())
+    count = int(np.count_nonzero(rows != np.arange(len(time_s))))
+    bridged_s = count * float(np.median(np.diff(time_s)))
+    assert codes(found)["duplicates"] == count and "bridged" not in codes(found)
+    assert _text(found, "duplicates").endswith(
+        f"repeat the one before: left out, the {bridged_s:.1f} s that they stood for bridged"
+    )
+    assert found.imu_facts.bridged_s == pytest.approx(bridged_s, rel=1e-3)
+
+
+def test_samples_that_are_missing_are_told_apart_from_repeats() -> None:
+    time_s = imu_times()
+    whole = np.arange(len(time_s))
+    missing = samples(time_s).take(whole[whole % 20 != 10])
+    assert "are missing in steps below 0.1 s" in _text(gathered(missing, fixes()), "bridged")
+
+
 def test_a_stretch_of_the_log_written_again_does_not_go_back_in_time() -> None:
     time_s = imu_times()
     again = np.concatenate((np.arange(4000), np.arange(2000, 6000)))

@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 
 from groundstation.chapters.markdown import markdown
-from groundstation.chapters.parts import Figure, Grid, Note, Rank, Section
+from groundstation.chapters.parts import Figure, Grid, Mark, Note, Rank, Section
 from groundstation.plots.plot import Plot
 from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults, NotAssessable
 from groundstation.results.manifest import Manifest
 from groundstation.results.schema import summary_schema
 from groundstation.systems.system import Systems
-from groundstation.systems.trajectory.answer import BestTrajectory
+from groundstation.systems.trajectory.analysis import TRAJECTORY
+from groundstation.systems.trajectory.answer import BestTrajectory, TrajectoryParameter, UnitMounting
 from groundstation.systems.trajectory.chapter import trajectory
 from groundstation.systems.trajectory.onboard_answer import ChangeOfConstant, OnboardErrors, WrongSpan
 from groundstation.systems.trajectory.plots import PLOTS
@@ -205,6 +206,31 @@ def test_the_tab_has_both_tracks_and_every_page(name: str, tmp_path: Path) -> No
     assert any(path.startswith("/trajectory/onboard_attitude") for path in contents.batches) == has_filter
     text = contents.text("/trajectory/answer").replace("\\", "")
     assert sentence_of(ANSWERS[name]).split(" ")[0] in text
+
+
+def test_the_line_on_the_terminal_says_whose_attitude_it_is_where_it_is_not_the_vehicles() -> None:
+    made = without_filter()
+    turned = UnitMounting("found", "", off_deg=9.0, to_state_deg=(0.7, 7.3, 185.3))
+    line = TRAJECTORY.sentence
+    assert line({"trajectory": made}).startswith("heading to ")
+    told = line({"trajectory": replace(made, mounting=turned)})
+    assert told.startswith("attitude of the unit, 9.0 deg off the vehicle's: heading to ")
+    told = line({"trajectory": replace(made, mounting=UnitMounting("case", ""))})
+    assert told.startswith("attitude of the unit's case, not of the vehicle: heading to ")
+    in_doubt = replace(doubtful(), mounting=turned)
+    assert line({"trajectory": in_doubt}).startswith("sigmas may be too small")
+
+
+def test_what_is_not_observable_has_no_value_and_one_far_from_what_was_assumed_is_told_as_coupled() -> None:
+    scale = TrajectoryParameter("accelerometer scale z", "accelerometer scale", "%", 17.1, 0.82, 1.2, False)
+    hidden = replace(scale, name="gyro scale x", value=1.6)
+    late = replace(scale, name="GNSS latency", group="latency", unit="s", value=5.0, sigma=1.5, start_sigma=2.0)
+    made = replace(without_filter(), parameters=(scale, hidden, late))
+    found = grid(section_of(made), "Parameters found")
+    assert found.rows[0][1:3] == ("17.1 ± 1.6%", "± 2.4%") and found.rows[0][3] == Mark("warn", "not by itself")
+    assert found.rows[1][1:] == ("—", "± 2.4%", Mark("unknown", "no"))
+    assert not late.is_far and "a sum with others" in found.caption and "no value is told" in found.caption
+    assert "a sum with others" not in grid(section_of(replace(made, parameters=(hidden,))), "Parameters").caption
 
 
 def test_a_filter_that_changed_opens_the_report_without_a_wrong_span() -> None:
