@@ -235,7 +235,11 @@ def _recorded(log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool) 
         metadata = {**found.header.metadata, **told_of_fields(found.remarks)}
         batches = corrected(items, found.clock)
         flight = flight_from_batches(
-            batches, metadata=metadata, has_utc=found.clock.is_absolute, source_name=log.source.name
+            batches,
+            metadata=metadata,
+            has_utc=found.clock.is_absolute,
+            source_name=log.source.name,
+            rows=ledger.rows,
         )
     facts = facts_of(log, found.header.metadata, ledger)
     findings = ledger_findings(found.ledger)
@@ -264,7 +268,7 @@ def _stored(log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool) ->
     flight = None
     if with_flight:
         flight = flight_from_batches(
-            intact(), metadata=info.metadata, has_utc=info.has_utc, source_name=info.source_name
+            intact(), metadata=info.metadata, has_utc=info.has_utc, source_name=info.source_name, rows=info.ledger.rows
         )
     else:
         for _ in intact():
