@@ -74,7 +74,7 @@ def rhythm_of(topic: str, time_ns: Int64Array, thresholds: Thresholds) -> Rhythm
     ahead = steps[steps > 0]
     if not len(ahead):
         return Rhythm(steps, 0, 0.0, False, False, thresholds.gaps)
-    some = np.sort(ahead[:: len(ahead) // MOST_STEPS | 1])  # odd: two steps in turn are both met
+    some = ahead[:: len(ahead) // MOST_STEPS | 1]  # odd: two steps in turn are both met
     usual_ns = quantile(some, 0.5)
     found = Rhythm(steps, len(ahead), usual_ns, True, True, thresholds.gaps)
     if _is_sporadic(topic, found, quantile(some, 0.8), limits):

@@ -79,7 +79,13 @@ class Constancy:
             return
         differs: BoolArray = values[1:] != values[:-1]
         changes = int(np.count_nonzero(differs))
-        starts, ends = _ends_and_long(differs, changes, self._min_samples)
+        if changes == count - 1:  # every sample differs: the usual case of what is measured
+            starts = np.array([0, count - 1] if count > 1 else [0])
+            ends = starts + 1
+        else:
+            borders = np.flatnonzero(differs) + 1
+            starts, ends = _ends_and_long(borders, count, self._min_samples)
+            self._measure(values, borders[:CHANGES_MEASURED])
         first, last = (starts, ends - 1) if rows is None else (rows[starts], rows[ends - 1])
         found = np.empty(len(starts), dtype=_STRETCH)
         found["first_index"], found["first_ns"] = record_index[first], device_ns[first]
@@ -95,11 +101,14 @@ class Constancy:
             self._keep(self._open)
         self._keep(found[:-1])
         self._open = found[-1:]
-        if 0 < changes < count - 1:
-            at = np.flatnonzero(differs)[:CHANGES_MEASURED]
-            with np.errstate(over="ignore"):  # from one end of a float to the other
-                smallest = float(np.abs(values[at + 1] - values[at]).min())
-            self.resolution = min(self.resolution or smallest, smallest)
+
+    def _measure(self, values: FloatArray, changed: Int64Array) -> None:
+        """Take note of the smallest of some changes; ``changed`` are the samples behind them."""
+        if not len(changed):
+            return
+        with np.errstate(over="ignore"):  # from one end of a float to the other
+            smallest = float(np.abs(values[changed] - values[changed - 1]).min())
+        self.resolution = min(self.resolution or smallest, smallest)
 
     def stretches(self) -> list[ConstantStretch]:
         """Return the long stretches, in the order of the log."""
@@ -124,17 +133,16 @@ class Constancy:
             self._kept = [kept[np.argsort(-kept["samples"], kind="stable")[: MOST_STRETCHES // 2]]]
 
 
-def _ends_and_long(differs: BoolArray, changes: int, min_samples: int) -> tuple[Int64Array, Int64Array]:
-    """Return starts and ends of the first, the last and the long stretches of some samples."""
-    count = len(differs) + 1
-    if changes == count - 1:  # every sample differs: the usual case of what is measured
-        starts = np.array([0, count - 1] if count > 1 else [0])
-        return starts, starts + 1
-    borders = np.flatnonzero(differs) + 1
-    starts, ends = np.concatenate(([0], borders)), np.concatenate((borders, [count]))
-    wanted = ends - starts >= min_samples
-    wanted[0] = wanted[-1] = True
-    return starts[wanted], ends[wanted]
+def _ends_and_long(borders: Int64Array, count: int, min_samples: int) -> tuple[Int64Array, Int64Array]:
+    """Return starts and ends of the first, the last and the long stretches of ``count`` samples.
+
+    ``borders`` are the samples that differ from the one before.
+    """
+    if not len(borders):
+        return np.array([0]), np.array([count])
+    long = np.flatnonzero(borders[1:] - borders[:-1] >= min_samples)
+    starts = np.concatenate(([0], borders[long], borders[-1:]))
+    return starts, np.concatenate((borders[:1], borders[long + 1], [count]))
 
 
 class Sampler:
