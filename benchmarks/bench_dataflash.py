@@ -70,9 +70,12 @@ def damaged(source: Path, target: Path, seed: int = 1) -> None:
 def to_tables(path: Path, *, is_surveyed: bool = True) -> int:
     """Read and make the tables of all topics, the clock repaired and a ledger made; returns the number of records."""
     items = list(read(Source(path)))
-    clock = survey(items).clock if is_surveyed else ClockModel(has_times=True)
+    clock, rows = ClockModel(has_times=True), {}
+    if is_surveyed:
+        found = survey(items)
+        clock, rows = found.clock, found.ledger.rows
     batches = corrected(items, clock)
-    flight = flight_from_batches(batches, metadata={}, has_utc=clock.is_absolute, source_name=path.name)
+    flight = flight_from_batches(batches, metadata={}, has_utc=clock.is_absolute, source_name=path.name, rows=rows)
     return sum(len(table) for topic, table in flight.tables.items() if topic.startswith("raw."))
 
 

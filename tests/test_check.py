@@ -282,3 +282,29 @@ def test_a_profile_serves_the_logs_that_it_describes(tmp_path: Path) -> None:
     found = json.loads(out)
     assert code == 0 and [one["state"] for one in found] == ["done", "done"], out[:300]
     assert groundstation("check", flat, "--profile", profile)[0] == 1
+
+
+def test_tables_whose_rows_were_counted_are_made_without_a_move(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from groundstation.pipeline.verbs import export
+    from groundstation.tables import growing
+
+    rows = 70_000  # more than a batch has
+    log, stored = tmp_path / "long.csv", tmp_path / "long.mcap"
+    cells = (f"{0.02 * row:.2f},{47.0 + 1e-6 * row:.6f},8.5,{row % 90}.0" for row in range(rows))
+    log.write_text("\n".join(["time_s,ins.latitude_deg,ins.longitude_deg,ins.true_heading_deg", *cells, ""]))
+    assert groundstation("convert", log, "-o", stored)[0] == 0
+    moves: list[int] = []
+    moved = growing._moved
+
+    def counted(values: Any, start: int, room: int, dtype: Any) -> Any:
+        moves.append(start)
+        return moved(values, start, room, dtype)
+
+    monkeypatch.setattr(growing, "_moved", counted)
+    for path in (log, stored):
+        assert groundstation("check", "--for", "heading", path)[0] == 4  # nothing to judge it by
+        flight, *_rest = export._read(path, Configuration())
+        assert len(flight["ins"]) == rows
+    assert not moves

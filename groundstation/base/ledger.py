@@ -255,6 +255,11 @@ class Ledger:
         return f"<Ledger: {', '.join(told)}; {'data lost' if self.loses_data else 'no data lost'}>"
 
     @property
+    def rows(self) -> dict[str, int]:
+        """Number of records of each topic."""
+        return {name: topic.rows for name, topic in self.topics.items()}
+
+    @property
     def completeness(self) -> dict[str, float]:
         """Share of expected samples by topic, where it is known."""
         return {name: topic.coverage for name, topic in self.topics.items() if topic.coverage is not None}

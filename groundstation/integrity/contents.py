@@ -124,11 +124,13 @@ class Contents:
         """
         device_ns = batch.device_time_ns.values if device_ns is None else device_ns
         tally = self._topics.setdefault(batch.topic, _TopicTally())
-        rows_of: dict[int, Int64Array] = {}  # columns of one source share the array that tells where they are present
+        rows_of: dict[int, Int64Array | None] = {}  # columns of one source share the array that tells where they are
         for name, column in batch.columns.items():
             mask, rows = column.present, None
-            if mask is not None and (rows := rows_of.get(id(mask))) is None:
-                rows = rows_of[id(mask)] = np.flatnonzero(mask)
+            if mask is not None:
+                if id(mask) not in rows_of:
+                    rows_of[id(mask)] = None if mask.all() else np.flatnonzero(mask)
+                rows = rows_of[id(mask)]
             self._field(tally, batch.topic, name).add(column, rows, batch.record_index, device_ns)
         if tally.counters is None:
             tally.counters = counters_of(batch, self._thresholds.sequence)

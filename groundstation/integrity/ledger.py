@@ -198,6 +198,11 @@ class LedgerCounts:
         raise KeyError(topic)
 
     @property
+    def rows(self) -> dict[str, int]:
+        """Number of records of each topic."""
+        return {ledger.topic: ledger.rows for ledger in self.topics}
+
+    @property
     def gaps(self) -> tuple[Gaps, ...]:
         """Gaps of the topics that have any."""
         return tuple(ledger.gaps for ledger in self.topics if len(ledger.gaps))

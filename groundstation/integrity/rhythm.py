@@ -98,7 +98,7 @@ def rhythm_of(topic: str, time_ns: Int64Array, thresholds: Thresholds, pauses: S
     ahead = steps[steps > 0]
     if not len(ahead):
         return Rhythm(steps, 0, 0.0, False, False, thresholds.gaps)
-    some = np.sort(ahead[:: len(ahead) // MOST_STEPS | 1])  # odd: two steps in turn are both met
+    some = ahead[:: len(ahead) // MOST_STEPS | 1]  # odd: two steps in turn are both met
     usual_ns = quantile(some, 0.5)
     rows = (int(np.searchsorted(time_ns, one.start_ns, "right")) - 1 for one in pauses)
     paused = tuple(row for row in rows if 0 <= row < len(steps))

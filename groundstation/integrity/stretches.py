@@ -13,7 +13,6 @@ from groundstation.integrity.clock import ClockModel
 
 MOST_STRETCHES = 512  # kept of a field: the longest
 CHANGES_MEASURED = 512  # number of changes of a batch that are measured
-NEXT_HELD = 3  # rows from the last pair of equal samples to the next, with one sample between
 FloatArray = NDArray[np.float64]
 
 
@@ -78,7 +77,13 @@ class Constancy:
             return
         differs: BoolArray = values[1:] != values[:-1]
         changes = int(np.count_nonzero(differs))
-        starts, ends = _ends_and_long(differs, changes, self._min_samples)
+        if changes == count - 1:  # every sample differs: the usual case of what is measured
+            starts = np.array([0, count - 1] if count > 1 else [0])
+            ends = starts + 1
+        else:
+            borders = np.flatnonzero(differs) + 1
+            starts, ends = _ends_and_long(borders, count, self._min_samples)
+            self._measure(values, differs, borders[:CHANGES_MEASURED])
         first, last = (starts, ends - 1) if rows is None else (rows[starts], rows[ends - 1])
         found = np.empty(len(starts), dtype=_STRETCH)
         found["first_index"], found["first_ns"] = record_index[first], device_ns[first]
@@ -94,13 +99,16 @@ class Constancy:
             self._keep(self._open)
         self._keep(found[:-1])
         self._open = found[-1:]
-        if 0 < changes < count - 1:
-            at = np.flatnonzero(differs)[:CHANGES_MEASURED]
-            with np.errstate(over="ignore", invalid="ignore"):  # from one end of a float to the other, or no numbers
-                smallest = float(np.abs(values[at + 1] - values[at]).min())
-                step = _step_between_held(values, differs)
-            self._smallest = min(self._smallest or smallest, smallest)
-            self._step = min(self._step or step, step or self._step)
+
+    def _measure(self, values: FloatArray, differs: BoolArray, changed: Int64Array) -> None:
+        """Take note of the smallest of some changes; ``changed`` are the samples behind them."""
+        if not len(changed):
+            return
+        with np.errstate(over="ignore", invalid="ignore"):  # from one end of a float to the other, or no numbers
+            smallest = float(np.abs(values[changed] - values[changed - 1]).min())
+            step = _step_between_held(values, differs, changed)
+        self._smallest = min(self._smallest or smallest, smallest)
+        self._step = min(self._step or step, step or self._step)
 
     @property
     def resolution(self) -> float:
@@ -134,28 +142,35 @@ class Constancy:
             self._kept = [kept[np.argsort(-kept["samples"], kind="stable")[: MOST_STRETCHES // 2]]]
 
 
-def _step_between_held(values: FloatArray, differs: BoolArray) -> float:
+def _step_between_held(values: FloatArray, differs: BoolArray, changed: Int64Array) -> float:
     """Return the smallest step from one value that lasts to the next; 0 without any.
 
-    A value lasts for two samples or more, and at most one sample lies between the two.
+    A value lasts for two samples or more, and at most one sample lies between the two. ``changed`` are the samples
+    behind the changes to be looked at, ``differs`` tells which samples the next one differs from.
     """
-    held = np.flatnonzero(~differs)
-    steps = np.abs(values[held[1:]] - values[held[:-1]])[np.diff(held) <= NEXT_HELD]
+    inside = changed[(changed >= 2) & (changed < len(differs))]
+    inside = inside[~differs[inside - 2]]  # those before which a value lasted
+    is_next = ~differs[inside]
+    apart = inside[~is_next]
+    apart = apart[apart + 1 < len(differs)]
+    apart = apart[~differs[apart + 1]]
+    steps = np.concatenate(
+        (np.abs(values[inside] - values[inside - 1])[is_next], np.abs(values[apart + 1] - values[apart - 1]))
+    )
     steps = steps[steps > 0.0]
     return float(steps.min()) if len(steps) else 0.0
 
 
-def _ends_and_long(differs: BoolArray, changes: int, min_samples: int) -> tuple[Int64Array, Int64Array]:
-    """Return starts and ends of the first, the last and the long stretches of some samples."""
-    count = len(differs) + 1
-    if changes == count - 1:  # every sample differs: the usual case of what is measured
-        starts = np.array([0, count - 1] if count > 1 else [0])
-        return starts, starts + 1
-    borders = np.flatnonzero(differs) + 1
-    starts, ends = np.concatenate(([0], borders)), np.concatenate((borders, [count]))
-    wanted = ends - starts >= min_samples
-    wanted[0] = wanted[-1] = True
-    return starts[wanted], ends[wanted]
+def _ends_and_long(borders: Int64Array, count: int, min_samples: int) -> tuple[Int64Array, Int64Array]:
+    """Return starts and ends of the first, the last and the long stretches of ``count`` samples.
+
+    ``borders`` are the samples that differ from the one before.
+    """
+    if not len(borders):
+        return np.array([0]), np.array([count])
+    long = np.flatnonzero(borders[1:] - borders[:-1] >= min_samples)
+    starts = np.concatenate(([0], borders[long], borders[-1:]))
+    return starts, np.concatenate((borders[:1], borders[long + 1], [count]))
 
 
 class Sampler:

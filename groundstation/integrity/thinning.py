@@ -33,19 +33,25 @@ class Thinner:
         places = np.flatnonzero(usable)
         if not len(places):
             return np.ones(len(usable), dtype=bool)
-        time = time_ns[places]
+        if len(places) == len(usable):
+            return self._kept(time_ns)
+        kept = self._kept(time_ns[places])
+        beside = np.searchsorted(places, np.flatnonzero(~usable))
+        kept[np.minimum(beside, len(places) - 1)] = kept[np.maximum(beside - 1, 0)] = True
+        wanted = ~usable
+        wanted[places] = kept
+        return wanted
+
+    def _kept(self, time: Int64Array) -> BoolArray:
+        """Tell which of the usable records are needed, whatever stands between them."""
         steps = np.diff(time)
+        self._steps.append(np.unique(steps[steps > 0], return_counts=True))
         kept = self._of_runs(time, steps)
         stretch = time // (self._tolerance_ns // 2)
         enters = stretch[1:] != stretch[:-1]
         kept[1:] |= enters
         kept[:-1] |= enters
-        beside = np.searchsorted(places, np.flatnonzero(~usable))
-        kept[np.minimum(beside, len(places) - 1)] = kept[np.maximum(beside - 1, 0)] = True
-        self._steps.append(np.unique(steps[steps > 0], return_counts=True))
-        wanted = ~usable
-        wanted[places] = kept
-        return wanted
+        return kept
 
     @property
     def period_ns(self) -> int:
@@ -64,12 +70,16 @@ class Thinner:
         """Select beginnings of runs, both ends of the window, and late records."""
         starts = np.concatenate(([0], np.flatnonzero(np.abs(steps) > self._tolerance_ns) + 1))
         lengths = np.diff(starts, append=len(time))
-        kept: BoolArray = np.arange(len(time)) - np.repeat(starts, lengths) < self._run_records
+        begins = np.zeros(len(time) + 1, dtype=np.int8)
+        begins[starts] = 1
+        begins[starts + np.minimum(lengths, self._run_records)] -= 1  # behind the beginning of a run
+        kept: BoolArray = np.cumsum(begins[:-1], dtype=np.int8) > 0
         kept[-self._run_records :] = True
-        seen = np.where(np.repeat(self._ahead(time, starts, lengths), lengths), time.min(), time)
-        if self._latest_ns is not None:
-            seen[0] = max(int(seen[0]), self._latest_ns)
+        ahead = self._ahead(time, starts, lengths)
+        seen = np.where(np.repeat(ahead, lengths), time.min(), time) if ahead.any() else time
         latest = np.maximum.accumulate(seen)
+        if self._latest_ns is not None:
+            latest = np.maximum(latest, self._latest_ns)
         self._latest_ns = int(latest[-1])
         kept |= latest - time > self._tolerance_ns
         return kept

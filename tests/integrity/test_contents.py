@@ -1,5 +1,6 @@
 """Stuck values, counters, sporadic topics and spans of damage, each with the truth that was built in."""
 
+import itertools
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -10,8 +11,9 @@ from numpy.typing import NDArray
 from groundstation.base.records import Column, Damage, Item, LogHeader, RecordBatch
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity import LedgerCounts, ledger_findings, survey
+from groundstation.integrity.clock_steps import quantile
 from groundstation.integrity.limits import thresholds_from
-from groundstation.integrity.stretches import Sampler
+from groundstation.integrity.stretches import Constancy, Sampler
 from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.log import open_log
@@ -363,3 +365,31 @@ def test_numbers_at_the_ends_of_a_float_give_no_warning() -> None:
     ends = {name: np.where(np.arange(len(TIME_S)) % 2, 1.7e308, -1.7e308) for name in flight()}
     found = survey([LogHeader("test"), *batches("gnss", fields), *batches("ins", ends)])
     assert all("\n" not in finding.text for finding in ledger_findings(found.ledger))
+
+
+@pytest.mark.parametrize("levels", [1, 2, 3, 40])
+def test_stretches_are_those_of_a_walk_sample_by_sample(levels: int) -> None:
+    """However the samples are cut into batches, and whichever rows of a batch they are."""
+    rng = np.random.default_rng(levels)
+    values = rng.integers(0, levels, 400).astype(float)
+    values[100:130] = values[130]
+    runs = [(value, len(list(same))) for value, same in itertools.groupby(values.tolist())]
+    ends = np.cumsum([length for _value, length in runs])
+    long = [(int(end) - n, n, value) for (value, n), end in zip(runs, ends, strict=True) if n >= 3]
+    for cut in (400, 57, 1):
+        found = Constancy(3)
+        for first in range(0, 400, cut):
+            part = values[first : first + cut]
+            places = np.arange(2 * first, 2 * (first + len(part)))
+            found.add(part, places, 10 * places, 2 * np.arange(len(part)))
+        told = [(one.first.record_index // 2, one.samples, one.value) for one in found.stretches()]
+        assert told == long and found.changes == len(runs) - 1
+
+
+def test_quantiles_are_those_of_the_sorted_steps() -> None:
+    rng = np.random.default_rng(1)
+    for steps in (rng.integers(0, 10**9, 999), rng.integers(0, 3, 1000), np.full(7, 20_000_000), np.array([5])):
+        ordered = np.sort(steps)
+        for share in (0.0, 0.5, 0.8, 1.0):
+            expected = np.interp(share * (len(steps) - 1), np.arange(len(steps)), ordered)
+            assert quantile(steps, share) == pytest.approx(expected, rel=1e-12)

@@ -333,13 +333,12 @@ def read_flight(mcap: Path, converted: Converted) -> Flight:
 
     info = converted.info
     batches = (item for item in read(mcap) if isinstance(item, RecordBatch))
-    rows = {topic: entry.rows for topic, entry in info.ledger.topics.items()}
     return flight_from_batches(
         batches,
         metadata=info.metadata,
         has_utc=info.has_utc,
         source_name=info.source_name,
-        rows=rows,
+        rows=info.ledger.rows,
         pauses=info.ledger.pauses,
     )
 

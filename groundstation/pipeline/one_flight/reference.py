@@ -258,21 +258,24 @@ def _read(log: Log) -> "tuple[Flight, tuple[Damage, ...], bool]":
     from groundstation.store.reader import read_info
     from groundstation.tables.assemble import flight_from_batches
 
-    def tables(batches: Sequence[RecordBatch], metadata: Mapping[str, str], has_utc: bool) -> "Flight":
-        return flight_from_batches(batches, metadata=metadata, has_utc=has_utc, source_name=log.source.name)
+    def tables(
+        batches: Sequence[RecordBatch], metadata: Mapping[str, str], has_utc: bool, rows: Mapping[str, int]
+    ) -> "Flight":
+        name = log.source.name
+        return flight_from_batches(batches, metadata=metadata, has_utc=has_utc, source_name=name, rows=rows)
 
     kinds = (TRUTH, "ins", "gnss")
     if log.is_store:
         info, items = read_info(log.path), list(log.items())
         kept = [one for one in items if isinstance(one, RecordBatch) and kind_of(one.topic) in kinds]
         damages = tuple(one for one in items if isinstance(one, Damage))
-        return tables(kept, info.metadata, info.has_utc), damages, info.has_utc
+        return tables(kept, info.metadata, info.has_utc, info.ledger.rows), damages, info.has_utc
     replay = log.replay()
     found = survey(replay)
     kept = [one for one in corrected(replay, found.clock) if kind_of(one.topic) in kinds]
     told = {f"{one.code}.{one.topic}.{name}": one.text for one in found.remarks for name in one.fields}
     return (
-        tables(kept, {**found.header.metadata, **told}, found.clock.is_absolute),
+        tables(kept, {**found.header.metadata, **told}, found.clock.is_absolute, found.ledger.rows),
         found.damages,
         found.clock.is_absolute,
     )

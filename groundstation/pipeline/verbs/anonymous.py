@@ -308,7 +308,7 @@ def _positions_of(mcap: Path, info: "StoreInfo") -> Flight:
     everything = np.iinfo(np.int64)
     part = StorePart(everything.min, everything.max, lambda topic: kind_of(topic) in ("ins", "gnss"))
     batches = (item for item in read(mcap, part) if isinstance(item, RecordBatch))
-    return flight_from_batches(batches, metadata={}, has_utc=info.has_utc, source_name="")
+    return flight_from_batches(batches, metadata={}, has_utc=info.has_utc, source_name="", rows=info.ledger.rows)
 
 
 def _change(flight: Flight, topic: str, disguise: Disguise) -> tuple[Int64Array, FloatArray] | None:

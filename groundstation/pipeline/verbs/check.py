@@ -239,6 +239,7 @@ def _recorded(log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool) 
             metadata=metadata,
             has_utc=found.clock.is_absolute,
             source_name=log.source.name,
+            rows=ledger.rows,
             pauses=ledger.pauses,
         )
     facts = facts_of(log, found.header.metadata, ledger)
@@ -272,6 +273,7 @@ def _stored(log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool) ->
             metadata=info.metadata,
             has_utc=info.has_utc,
             source_name=info.source_name,
+            rows=info.ledger.rows,
             pauses=info.ledger.pauses,
         )
     else:

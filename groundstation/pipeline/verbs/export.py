@@ -115,7 +115,9 @@ def _read(path: Path, configuration: Configuration) -> "tuple[Flight, SavedFligh
         info, items = read_info(mcap), list(read(mcap))
     batches = (item for item in items if isinstance(item, RecordBatch))
     has_lost |= any(isinstance(item, Damage) and item.loses_data for item in items)
-    flight = flight_from_batches(batches, metadata=info.metadata, has_utc=info.has_utc, source_name=info.source_name)
+    flight = flight_from_batches(
+        batches, metadata=info.metadata, has_utc=info.has_utc, source_name=info.source_name, rows=info.ledger.rows
+    )
     return flight, saved, has_lost
 
 

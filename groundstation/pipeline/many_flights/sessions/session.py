@@ -190,7 +190,9 @@ def _read(mcap: Path, info: "StoreInfo") -> Flight:
     from groundstation.store.reader import read
 
     batches = (item for item in read(mcap) if isinstance(item, RecordBatch) and kind_of(item.topic) in KINDS)
-    return flight_from_batches(batches, metadata=info.metadata, has_utc=info.has_utc, source_name=info.source_name)
+    return flight_from_batches(
+        batches, metadata=info.metadata, has_utc=info.has_utc, source_name=info.source_name, rows=info.ledger.rows
+    )
 
 
 def _results(
