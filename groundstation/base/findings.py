@@ -32,7 +32,7 @@ class Finding:
         Number of cases, where that makes sense.
     """
 
-    severity: Severity
+    severity: Severity  #: info, warn or fail: `--fail-on` compares with it.
     code: str
     text: str
     topic: str = ""

@@ -18,38 +18,38 @@ NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not o
 class ThresholdsUsed:
     """Thresholds the ledger was made with: name, version of the layout, digest of the values."""
 
-    name: str = ""
-    sha256: str = field(default="", metadata={"pattern": "^([0-9a-f]{64})?$"})
-    version: int = 0
+    name: str = ""  #: Name in the file of thresholds.
+    sha256: str = field(default="", metadata={"pattern": "^([0-9a-f]{64})?$"})  #: Digest of the values.
+    version: int = 0  #: Version of the layout of that file.
 
 
 @dataclass(frozen=True, kw_only=True)
 class GapDefinition:
     """Definition of a gap: longer than ``periods`` nominal periods and than ``min_s`` seconds."""
 
-    min_s: float = 0.0
-    periods: float = 0.0
+    min_s: float = 0.0  #: A gap is longer than so many seconds,
+    periods: float = 0.0  #: and than so many nominal periods of its topic.
 
 
 @dataclass(frozen=True, kw_only=True)
 class OutOfRange:
     """First value outside its range: record, time, and the range (None where it has no end)."""
 
-    range: tuple[float | None, float | None]
-    record: int | None
-    time: str | None
+    range: tuple[float | None, float | None]  #: Lowest and highest value allowed; null where there is no end.
+    record: int | None  #: Place of the record in the log.
+    time: str | None  #: When, for people.
 
 
 @dataclass(frozen=True, kw_only=True)
 class StuckStretch:
     """Stretch in which a field was stuck at ``value``, and the evidence."""
 
-    length_s: float
-    record: int
+    length_s: float  #: How long it stood still.
+    record: int  #: Place of its first record in the log.
     samples: int = field(metadata={"least": 1})
-    start: str
-    value: float
-    why: str
+    start: str  #: When it began, for people.
+    value: float  #: Value at which it stood.
+    why: str  #: What shows that it should have moved.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,11 +61,14 @@ class FieldEntry:
 
     schema_name: ClassVar[str] = "ledger_field"
 
+    #: Samples of an inertial unit that stand at the end of its range.
     at_end: int = field(default=0, metadata=LEFT_OUT_WHEN_DEFAULT)
+    #: First value outside its range; null without any.
     first_out_of_range: OutOfRange | None = field(default=None, metadata=LEFT_OUT_WHEN_DEFAULT)
-    nan: int = 0
-    out_of_range: int = 0
-    present: int = 0
+    nan: int = 0  #: Samples that the device itself wrote as NaN.
+    out_of_range: int = 0  #: Samples outside the range of the signal.
+    present: int = 0  #: Samples that have the field.
+    #: Stretches in which the value did not move though it should have.
     stuck: tuple[StuckStretch, ...] = field(default=(), metadata=LEFT_OUT_WHEN_DEFAULT)
 
 
@@ -76,10 +79,10 @@ class TopicGaps:
     ``listed`` are the first ones: time of the last sample before the gap, and seconds to the next sample.
     """
 
-    count: int
-    listed: tuple[tuple[str, float], ...] = ()
-    longest_s: float
-    total_s: float = 0.0
+    count: int  #: Number of gaps.
+    listed: tuple[tuple[str, float], ...] = ()  #: First gaps: time of the sample before, seconds to the next one.
+    longest_s: float  #: Length of the longest.
+    total_s: float = 0.0  #: Length of all gaps together.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,12 +92,13 @@ class CounterEntry:
     ``listed`` holds the record after each loss and how many were lost.
     """
 
-    before: int = 0
-    field: str
+    before: int = 0  #: Losses that stood in the counter at its first record.
+    field: str  #: Field that counts.
+    #: What it counts: every record written, or every loss.
     kind: str = dataclasses.field(metadata={"one_of": ("records", "losses")})
-    listed: tuple[tuple[str, int], ...] = ()
-    lost: int
-    resets: int = 0
+    listed: tuple[tuple[str, int], ...] = ()  #: Record after each loss, and how many were lost there.
+    lost: int  #: Losses that it shows altogether.
+    resets: int = 0  #: Times that it began anew.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,22 +111,24 @@ class TopicEntry:
 
     schema_name: ClassVar[str] = "ledger_topic"
 
-    actual_rate_hz: float | None
-    backward_steps: int
-    coverage: float | None
-    duplicates: int
-    fields: Mapping[str, FieldEntry] = field(default_factory=dict)
-    first: str
-    gaps: TopicGaps
+    actual_rate_hz: float | None  #: Samples over the time they span.
+    backward_steps: int  #: Steps back of device time.
+    coverage: float | None  #: Samples there over those that the nominal rate expects.
+    duplicates: int  #: Rows at the time of the one before, in order of time.
+    fields: Mapping[str, FieldEntry] = field(default_factory=dict)  #: Counts of each field, by name.
+    first: str  #: Time of the first row, for people.
+    gaps: TopicGaps  #: Steps that are longer than a gap may be.
+    #: Of an inertial unit that logs increments, share of the time that they cover.
     increments_share: float | None = field(default=None, metadata=LEFT_OUT_WHEN_DEFAULT)
+    #: RMS of the steps of an inertial unit less the nominal one, gaps left out.
     jitter_s: float | None = field(default=None, metadata=LEFT_OUT_WHEN_DEFAULT)
-    last: str
-    losses: Mapping[str, int] = field(default_factory=dict)
-    nominal_rate_hz: float | None
-    rows: int
-    sequences: tuple[CounterEntry, ...] = ()
-    span_s: float
-    stray_rows: int
+    last: str  #: Time of the last row, for people.
+    losses: Mapping[str, int] = field(default_factory=dict)  #: Unreadable rows, by kind.
+    nominal_rate_hz: float | None  #: Rate by the usual step between samples.
+    rows: int  #: Rows that were read.
+    sequences: tuple[CounterEntry, ...] = ()  #: Counters of the log that show losses.
+    span_s: float  #: From the first row to the last.
+    stray_rows: int  #: Rows out of order.
 
     @property
     def missing(self) -> int:
@@ -150,35 +156,35 @@ class DamagedSpan:
 
     schema_name: ClassVar[str] = "ledger_span"
 
-    cause: str
-    count: int
-    field: str
-    is_exact: bool
-    length_s: float
-    start: str
-    start_s: float
-    topic: str
+    cause: str  #: What damaged it, as a word.
+    count: int  #: Records or samples that are damaged within.
+    field: str  #: Field concerned; empty for all fields of the topic.
+    is_exact: bool  #: True: everything within is damaged; else the damage lies somewhere within.
+    length_s: float  #: From beginning to end.
+    start: str  #: Beginning as the log's clock tells it, for people.
+    start_s: float  #: Seconds from the first record of the log, as flight time counts.
+    topic: str  #: Topic concerned; empty for the whole log.
 
 
 @dataclass(frozen=True, kw_only=True)
 class DamageEntry:
     """Data that was lost or is odd: kind, place, how many of what."""
 
-    count: int
-    kind: str
-    loses_data: bool
-    place: str
-    topic: str
-    what: str
+    count: int  #: How many of `what`.
+    kind: str  #: Short name of the damage.
+    loses_data: bool  #: Whether something is missing from the flight by it.
+    place: str  #: Record, byte or time at which it stands, as text.
+    topic: str  #: Topic concerned; empty for the whole log.
+    what: str  #: Noun that is counted: records, bytes, samples.
 
 
 @dataclass(frozen=True, kw_only=True)
 class RemarkEntry:
     """Something the reader derived, converted or assumed."""
 
-    code: str
-    text: str
-    topic: str = ""
+    code: str  #: Stable name for scripts.
+    text: str  #: One line for people.
+    topic: str = ""  #: Topic concerned; empty for the whole log.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,8 +194,8 @@ class Dropouts:
     A whole 0 where it always could.
     """
 
-    count: int = 0
-    total_s: float | int = 0
+    count: int = 0  #: How often writing stopped.
+    total_s: float | int = 0  #: Length of all of them together.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -210,9 +216,9 @@ class PauseEntry:
 class Truncation:
     """Place where a log is cut, and how much of it is lost."""
 
-    count: int
-    place: str
-    what: str
+    count: int  #: How much is lost, of `what`.
+    place: str  #: Where the log ends, as text.
+    what: str  #: Noun that is counted: bytes, records.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -234,17 +240,20 @@ class Ledger:
     """
 
     bytes_skipped: int = 0
-    damages: tuple[DamageEntry, ...] = ()
-    dropouts: Dropouts = field(default_factory=Dropouts)
+    damages: tuple[DamageEntry, ...] = ()  #: Losses and oddities, each with its kind, place and count.
+    dropouts: Dropouts = field(default_factory=Dropouts)  #: Times at which the recorder could not write.
+    #: How long a step between samples must be to count as a gap.
     gap_definition: GapDefinition = field(default_factory=GapDefinition)
+    #: Times without log while disarmed; left out of summary.json where there is none.
     pauses: tuple[PauseEntry, ...] = field(default=(), metadata=LEFT_OUT_WHEN_DEFAULT)
-    remarks: tuple[RemarkEntry, ...] = ()
+    remarks: tuple[RemarkEntry, ...] = ()  #: What the reader derived, converted or assumed.
+    #: First byte, last byte and length of every part that made no record.
     skipped_spans: tuple[tuple[int, int, int], ...] = ()
-    spans: tuple[DamagedSpan, ...] = ()
-    spans_more: int = 0
-    thresholds: ThresholdsUsed = field(default_factory=ThresholdsUsed)
+    spans: tuple[DamagedSpan, ...] = ()  #: Damaged spans of time, in order.
+    spans_more: int = 0  #: Number of damaged spans beyond those listed.
+    thresholds: ThresholdsUsed = field(default_factory=ThresholdsUsed)  #: Limits that the ledger was made with.
     topics: Mapping[str, TopicEntry] = field(default_factory=dict)
-    truncated: Truncation | None = None
+    truncated: Truncation | None = None  #: Where the log is cut; null where it is whole.
 
     def __repr__(self) -> str:
         rows = sum(one.rows for one in self.topics.values())

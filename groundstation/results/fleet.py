@@ -41,7 +41,7 @@ class Densities:
     density_per_deg : ndarray, shape (k, m)
         Each row sums to the share of the flight's samples inside the grid, divided by the bin width.
     pooled_per_deg : ndarray, shape (m,)
-        The same of all samples together.
+        The same of all samples together, whatever their aircraft.
     """
 
     edge_deg: NDArray[np.float64]
@@ -62,6 +62,17 @@ class Densities:
     def center_deg(self) -> NDArray[np.float64]:
         """Bin centres, shape (m,)."""
         return np.asarray(0.5 * (self.edge_deg[1:] + self.edge_deg[:-1]))
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Names of the aircraft with samples, in order; flights whose log names none are left out."""
+        return tuple(sorted({name for name in self.aircraft.tolist() if name}))
+
+    def pooled_of(self, aircraft: str) -> NDArray[np.float64]:
+        """Density of the samples of an aircraft, merged from its flights, shape (m,)."""
+        own = self.aircraft == aircraft
+        count = self.samples[own]
+        return np.asarray(count @ self.density_per_deg[own].astype(np.float64) / max(int(count.sum()), 1))
 
 
 @dataclass(frozen=True)
@@ -122,10 +133,10 @@ class AircraftRow:
 
 @dataclass(frozen=True)
 class FleetSkill:
-    """Forecast skill of a method at a horizon over all flights.
+    """Forecast skill of a method at a horizon over all flights, or over those of one aircraft.
 
-    Mean squares and coverage are merged by starts. ``rms_m`` is over all starts of all flights;
-    ``median_flight_rms_m``, ``highest_flight_rms_m`` over the flights' own RMS; ``coverage95`` over the
+    ``aircraft`` is :data:`WHOLE_FLEET` for all. Mean squares and coverage are merged by starts. ``rms_m`` is over all
+    starts; ``median_flight_rms_m``, ``highest_flight_rms_m`` over the flights' own RMS; ``coverage95`` over the
     ``coverage_starts`` starts that had a band, None without any. Outages of one flight overlap, so a flight's own
     coverage says little: of the ``flights_judged`` with enough independent starts ``flights_within`` had a NEES within
     its 95 % limits.
@@ -142,6 +153,7 @@ class FleetSkill:
     coverage_starts: int
     flights_judged: int = 0
     flights_within: int = 0
+    aircraft: str = WHOLE_FLEET
 
 
 @dataclass(frozen=True)
@@ -288,7 +300,9 @@ class FleetResults:
     slopes : tuple of SlopeRow
         The line behind each control chart since its last change.
     skill : tuple of FleetSkill
-        By method in the order of ``METHODS``, then horizon.
+        All flights together: by method in the order of ``METHODS``, then horizon.
+    skill_by_aircraft : tuple of FleetSkill
+        The same for each named aircraft, by name.
     skill_flights : FleetSkillFlights
         The shipped method of every flight.
     calibration : tuple of FleetCalibration
@@ -339,6 +353,7 @@ class FleetResults:
     unit_trends: tuple[UnitTrendRow, ...] = ()
     unit_events: tuple[UnitEventRow, ...] = ()
     unit_flights: FleetUnitFlights = field(default_factory=FleetUnitFlights.empty)
+    skill_by_aircraft: tuple[FleetSkill, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "stated", MappingProxyType(dict(self.stated)))

@@ -29,18 +29,18 @@ Status = Literal["ok", "degraded", "failed"]
 class NotAssessable:
     """An analysis that could not be carried out, and the reason for people."""
 
-    analysis: str
-    reason: str
+    analysis: str  #: Name of the analysis, as in `groundstation list`.
+    reason: str  #: What is missing, for people.
 
 
 @dataclass(frozen=True)
 class Source:
     """The log a flight came from: name without folders, SHA-256, size, reader that claimed it."""
 
-    name: str
-    sha256: str = field(metadata={"pattern": "^[0-9a-f]{64}$"})
-    size_bytes: int
-    reader: str
+    name: str  #: File name without folders.
+    sha256: str = field(metadata={"pattern": "^[0-9a-f]{64}$"})  #: SHA-256 of the whole file, hexadecimal.
+    size_bytes: int  #: Length of the file.
+    reader: str  #: Format as the reader that claimed it names it.
 
 
 KIND_OF_VEHICLE = "vehicle.kind"  # keys of the metadata: rolls, flies, walks, floats or unknown

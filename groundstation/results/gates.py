@@ -27,15 +27,15 @@ class Gate:
     ``reason`` says in a few words why it failed or was not measured.
     """
 
-    name: str
-    title: str
-    value: float | None
-    limit: float | tuple[float, float]
-    unit: str
-    state: GateState
-    required: bool = True
-    reason: str = ""
-    sense: Sense = "at_most"
+    name: str  #: Stable name for scripts.
+    title: str  #: Name for people.
+    value: float | None  #: The figure; null when it could not be measured.
+    limit: float | tuple[float, float]  #: Number to reach or not to exceed, as `sense` says, or a pair [low, high].
+    unit: str  #: Unit of figure and limit.
+    state: GateState  #: passed, failed or not_measured.
+    required: bool = True  #: Whether it decides the verdict; others inform.
+    reason: str = ""  #: Few words on why it failed or was not measured.
+    sense: Sense = "at_most"  #: How figure and limit compare: at_most, at_least or between.
 
     def under(self, bound: Bound) -> "Gate":
         """The same value against another limit; the gate itself where the limit is the one it has.

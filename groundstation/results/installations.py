@@ -120,15 +120,15 @@ class Installed:
     than either's.
     """
 
-    flights: int
-    mounting_deg: float
-    mounting_sigma_deg: float
-    steady_deg: float
-    steady_sigma_deg: float
-    sum_deg: float
-    sum_sigma_deg: float
-    factor: float
-    factor_sigma: float
+    flights: int  #: Earlier flights that taught.
+    mounting_deg: float  #: Heading of the unit's axes minus that of the airframe.
+    mounting_sigma_deg: float  #: Standard deviation of the mounting.
+    steady_deg: float  #: Steady sideslip of the aircraft on taxi.
+    steady_sigma_deg: float  #: Standard deviation of the steady sideslip.
+    sum_deg: float  #: Mounting plus steady sideslip, which the flights see together.
+    sum_sigma_deg: float  #: Standard deviation of the sum: smaller than either's.
+    factor: float  #: Sideslip in degrees per m/s of crosswind.
+    factor_sigma: float  #: Standard deviation of the factor.
 
 
 @dataclass(frozen=True)
@@ -166,29 +166,29 @@ class LearnedHeading:
 
     schema_name: ClassVar[str] = "installation_result"
 
-    ins_serial: str
-    aircraft: str
+    ins_serial: str  #: Serial number, as logged or stated.
+    aircraft: str  #: Aircraft in which it is installed.
     flights: int
     why_not: str
-    verdict: str
-    verdict_reason: str
-    correction_deg: float | None
-    error_deg: float
-    standard_error_deg: float
-    confidence95_deg: tuple[float, float]
+    verdict: str  #: As of the heading correction, with the interval learned.
+    verdict_reason: str  #: Gate or figure that decided it, for people.
+    correction_deg: float | None  #: Number to type; null unless the verdict is accept.
+    error_deg: float  #: INS heading minus true heading of the airframe.
+    standard_error_deg: float  #: Standard error with what was learned in it.
+    confidence95_deg: tuple[float, float]  #: 95 % interval of the airframe's error [low, high].
     half_width_deg: float
-    alone_error_deg: float
-    alone_half_width_deg: float
+    alone_error_deg: float  #: Error by this taxi alone.
+    alone_half_width_deg: float  #: Half width of the interval by this taxi alone.
     interval_parts: tuple[IntervalPart, ...] = ()
-    platform_error_deg: float | None = None
-    platform_standard_error_deg: float | None = None
-    platform_confidence95_deg: tuple[float, float] | None = None
-    platform_parts: tuple[IntervalPart, ...] = ()
+    platform_error_deg: float | None = None  #: Azimuth of the INS itself minus true: the learned mounting is taken off.
+    platform_standard_error_deg: float | None = None  #: Standard error of the platform's azimuth.
+    platform_confidence95_deg: tuple[float, float] | None = None  #: 95 % interval of the platform's error [low, high].
+    platform_parts: tuple[IntervalPart, ...] = ()  #: What the platform's interval is made of.
     installed: Installed | None = None
-    odd: tuple[str, ...] = ()
-    changed: tuple[str, ...] = ()
-    residual_deg: float | None = None
-    residual_sigma_deg: float | None = None
+    odd: tuple[str, ...] = ()  #: Earlier flights that seem to be of another unit.
+    changed: tuple[str, ...] = ()  #: Earlier flights from which on the unit sits otherwise.
+    residual_deg: float | None = None  #: Platform error less the azimuth that the same flight showed later.
+    residual_sigma_deg: float | None = None  #: Standard deviation of that difference.
     settings: dict[str, float | str | bool] = field(default_factory=dict)
 
 

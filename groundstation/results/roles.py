@@ -60,13 +60,13 @@ class EarlyAzimuth:
     to the taxi may not come from hours later.
     """
 
-    error_deg: float
-    sigma_deg: float
-    time_s: float
-    rate_deg_per_h: float
-    rate_sigma_deg_per_h: float
-    correlation: float
-    turns: int
+    error_deg: float  #: INS heading minus true heading at time_s.
+    sigma_deg: float  #: Standard deviation of the error.
+    time_s: float  #: Flight second that the error is of.
+    rate_deg_per_h: float  #: Growth of the error.
+    rate_sigma_deg_per_h: float  #: Standard deviation of the growth.
+    correlation: float  #: Correlation of error and growth, -1 to 1.
+    turns: int  #: Turns of the first hour.
 
     def at(self, time_s: float) -> tuple[float, float]:
         """The error and its sigma at another flight time, deg.
@@ -94,13 +94,14 @@ class AzimuthEstimate:
 
     schema_name: ClassVar[str] = "azimuth"
 
-    observable: bool
-    error_deg: float | None
-    sigma_deg: float | None
-    turns: int
-    velocity_change_mps: float
-    reason: str
-    time_s: float | None = None
+    observable: bool  #: Whether the sigma is below the limit of the settings.
+    error_deg: float | None  #: INS heading minus true heading at time_s; null where not observable.
+    sigma_deg: float | None  #: Standard deviation of the error.
+    turns: int  #: Turns that it rests on.
+    velocity_change_mps: float  #: Change of velocity by the turns, which shows it.
+    reason: str  #: Why it is not observable, or what it rests on.
+    time_s: float | None = None  #: Flight second of the last turn: the error is of then.
+    #: The same by the first hour of turns, for the time of the taxi; null where that shows too little.
     early: EarlyAzimuth | None = None
 
 
@@ -118,9 +119,9 @@ class IntervalPart:
     The squares of the sigmas add up. ``half_width_deg`` is what the 95 % interval would be with this part alone.
     """
 
-    name: str
-    sigma_deg: float
-    half_width_deg: float
+    name: str  #: taxi, wind or installation.
+    sigma_deg: float  #: Its standard deviation: the squares add up.
+    half_width_deg: float  #: Half of the 95 % interval with this part alone.
 
 
 class HeadingByTrack:

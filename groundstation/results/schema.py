@@ -17,6 +17,7 @@ from typing import Any
 from groundstation.base.serial import is_kept_apart
 from groundstation.results.document import SCHEMA_VERSION, SummaryDocument
 from groundstation.results.installations import FORMAT_VERSION, Installations
+from groundstation.results.meanings import meanings_of
 
 TITLE = "summary.json of one flight"
 ABOUT = (
@@ -51,7 +52,8 @@ def summary_schema(answer_types: Mapping[str, type]) -> Schema:
     """
     definitions: dict[str, Schema] = {}
     whole = _object(SummaryDocument, definitions)
-    whole["properties"]["schema_version"] = {"const": SCHEMA_VERSION}
+    whole["properties"]["schema_version"] |= {"const": SCHEMA_VERSION}
+    del whole["properties"]["schema_version"]["type"], whole["properties"]["schema_version"]["minimum"]
     whole["properties"]["results"] = {
         "description": "One entry per analysis that could run.",
         "type": "object",
@@ -91,7 +93,7 @@ def _object(cls: type, definitions: dict[str, Schema]) -> Schema:
 
     All are required but those that are left out when they say nothing.
     """
-    hints, told = typing.get_type_hints(cls), _told(cls)
+    hints, told = typing.get_type_hints(cls), meanings_of(cls)
     properties: dict[str, Schema] = {}
     required: list[str] = []
     for field in dataclasses.fields(cls):
@@ -206,27 +208,6 @@ def _about(cls: type) -> str:
     """Return the text of a class's docstring above its first section."""
     paragraphs = (" ".join(one.split()) for one in (cls.__doc__ or "").split("\n\n"))
     return " ".join(itertools.takewhile(lambda one: "----" not in one, paragraphs)).strip()
-
-
-def _told(cls: type) -> dict[str, str]:
-    """Return the descriptions of fields in the docstrings of a class and its bases, by name."""
-    told: dict[str, str] = {}
-    for base in reversed(cls.__mro__):
-        told |= _told_in(base.__doc__ or "")
-    return told
-
-
-def _told_in(doc: str) -> dict[str, str]:
-    """Return the descriptions of fields in the numpydoc section Parameters of a docstring."""
-    _, _, listed = doc.partition("Parameters\n    ----------\n")
-    told: dict[str, str] = {}
-    names: list[str] = []
-    for line in listed.splitlines():
-        if re.match(r"    \w", line):
-            names = line.partition(" : ")[0].replace(",", " ").split()
-        elif line.strip() and len(names) == 1:
-            told[names[0]] = f"{told.get(names[0], '')} {line.strip()}".strip()
-    return told
 
 
 def schema_text(answer_types: Mapping[str, type]) -> str:

@@ -19,17 +19,19 @@ from pypdf import PdfReader
 
 from groundstation.base.timescales import utc_ns_to_stamp
 from groundstation.chapters.fleet import flights
+from groundstation.chapters.parts import Figure, Grid, Section
 from groundstation.chapters.plots.fleet.trend import charts
 from groundstation.methods.fleet import answer
 from groundstation.methods.fleet.changes import ChangeSettings
 from groundstation.methods.fleet.density import densities_of, histogram_of
 from groundstation.methods.fleet.deviation import deviations
 from groundstation.methods.fleet.moments import moments_of
-from groundstation.methods.fleet.skill import SkillMerger
+from groundstation.methods.fleet.skill import SkillMergers
 from groundstation.methods.fleet.trends import trends
 from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS
 from groundstation.pipeline.many_flights.fleet.statistics import gather
-from groundstation.plots.marks import Limit
+from groundstation.plots.marks import Curve, Limit
+from groundstation.reports.drawing import plot_of
 from groundstation.reports.fleet_report import MOST_ROWS_ON_PAPER, PAGE, write_fleet_report
 from groundstation.results.arrays.fleet import FleetChecks, FleetSkillFlights
 from groundstation.results.figures import FigureData
@@ -110,7 +112,7 @@ def fleet_of(
         answer.by_aircraft(flights),
         trend.charts,
         trend.changes,
-        skill.rows(),
+        skill.whole.rows(),
         skill_flights,
         answer.calibrations(checks),
         checks,
@@ -119,24 +121,26 @@ def fleet_of(
         answer.stated_rates(settings),
         deviations(flights),
         slopes=trend.slopes,
+        skill_by_aircraft=skill.by_aircraft(),
     )
 
 
-def skill_of(flights: FigureData, rate: Any) -> tuple[SkillMerger, FleetSkillFlights]:
-    merger, rows = SkillMerger(), []
+def skill_of(flights: FigureData, rate: Any) -> tuple[SkillMergers, FleetSkillFlights]:
+    mergers, rows = SkillMergers(), []
+    owner = flights["aircraft"].tolist()
     for place, own in enumerate(rate.tolist()):
         for method, factor in (("raw_ins", 1.6), ("hold_velocity", 1.2), ("last_estimate", 1.0)):
             for horizon in HORIZONS_MIN:
                 coverage = math.nan if method == "raw_ins" else 0.93
                 one = SkillOfFlight(method, horizon, 10, factor * own * 15.0 * horizon, coverage)
-                merger.add(one)
+                mergers.add(one, owner[place])
                 if method == "last_estimate":
                     rows.append((place, one))
     names = ("flight_id", "aircraft", "start_utc")
     columns = {name: flights[name][np.array([place for place, _ in rows], dtype=np.intp)] for name in names}
     for name in ("method", "horizon_min", "starts", "rms_m", "coverage95"):
         columns[name] = np.array([getattr(one, name) for _, one in rows], dtype="U20" if name == "method" else "f8")
-    return merger, FleetSkillFlights(**columns)
+    return mergers, FleetSkillFlights(**columns)
 
 
 def checks_of(flights: FigureData, rng: Any) -> FleetChecks:
@@ -293,6 +297,54 @@ def test_tiles_never_average_aircraft() -> None:
     assert "…" not in shown["Forecast, 60 min"][0]
 
 
+def test_the_forecast_and_the_density_are_told_of_each_aircraft(tmp_path: Path) -> None:
+    several = fleet_of(12, ("A12", "RA-1", ""), samples=20)
+    flown = several.skill_flights
+    at_60 = {name: flown.rms_m[(flown.aircraft == name) & (flown.horizon_min == 60.0)] for name in ("A12", "RA-1")}
+    expected = {name: float(np.sqrt(np.mean(rms**2))) for name, rms in at_60.items()}
+    assert abs(expected["A12"] - expected["RA-1"]) > 1.0
+    told = section_of(several, "forecast")
+    table = next(one for one in told.parts if isinstance(one, Grid) and one.title.startswith("RMS radial"))
+    at = [head.title for head in table.heads].index("60 min")
+    shipped = {row[0]: row[at] for row in table.rows if "(shipped)" in str(row[1])}
+    assert {name: float(str(value).replace("\u202f", "")) for name, value in shipped.items()} == pytest.approx(
+        expected, abs=0.5
+    )
+    assert {row[0] for row in table.rows} == {"A12", "RA-1"} and len(table.rows) == 2 * 3
+    assert "never merged" in told.lead and "4 flights name none" in told.lead
+    growth = plot_of(systems().fleet_plots, Figure("fleet.growth"), several)
+    assert growth is not None
+    curves = {one.name: one for one in growth.panels[0].marks if isinstance(one, Curve)}
+    assert list(curves) == ["A12", "RA-1"]
+    assert {name: float(one.y[one.x == 60.0][0]) for name, one in curves.items()} == pytest.approx(expected)
+    overlay = densities.overlay(several)
+    dashed = {one.name: one for one in overlay.panels[0].marks if isinstance(one, Curve) and one.dash == "dashed"}
+    assert list(dashed) == ["A12", "RA-1"] and "never merged" in section_of(several, "densities").lead
+    one, own = several.densities, several.densities.aircraft == "RA-1"
+    width = float(np.diff(one.edge_deg)[0])
+    assert one.pooled_of("RA-1").sum() * width == pytest.approx(1.0, abs=1e-5)
+    assert one.pooled_of("RA-1") == pytest.approx(one.density_per_deg[own].mean(axis=0), abs=1e-6)
+    page = page_of(tmp_path, several).text
+    assert "all samples" not in page and "over all starts of all flights" not in page
+
+
+def test_one_aircraft_is_named_in_a_sentence() -> None:
+    for key in ("forecast", "densities"):
+        assert "All are of A12." in section_of(fleet_of(4, ("A12",), samples=20), key).lead
+        assert "All are of" not in section_of(fleet_of(4, ("",), samples=20), key).lead
+    assert "The logs name no aircraft" in section_of(fleet_of(4, ("",), samples=20), "forecast").lead
+    mixed = section_of(fleet_of(4, ("A12", ""), samples=20), "forecast").lead
+    assert "All are of A12; 2 flights whose log names none count as its own." in mixed
+    many = section_of(fleet_of(40, [f"R{number}" for number in range(20)], samples=20), "forecast")
+    table = next(one for one in many.parts if isinstance(one, Grid) and one.title.startswith("RMS radial"))
+    assert len(table.rows) == 2 * 20 and "the raw INS and the shipped method" in table.caption
+
+
+def section_of(fleet: FleetResults, key: str) -> Section:
+    """A chapter of the fleet by its anchor."""
+    return next(one for chapter in systems().fleet_chapters if (one := chapter.build(fleet)) and one.key == key)
+
+
 def test_a_reason_is_told_once_with_its_flights(tmp_path: Path) -> None:
     why = [f"GNSS shows {speed} m/s at standstill, at most 0.01 m/s" for speed in (0.04, 0.05)]
     fleet = fleet_of(
@@ -378,6 +430,8 @@ ODD: dict[str, Any] = {
     "one": lambda: fleet_of(1),
     "one sample": lambda: fleet_of(1, samples=1),
     "unnamed": lambda: fleet_of(30, ("",)),
+    "named and not": lambda: fleet_of(30, ("A12", "RA-1", "")),
+    "one named and not": lambda: fleet_of(30, ("A12", "")),
     "timeless": lambda: fleet_of(30, start_utc=[None] * 30),
     "one time": lambda: fleet_of(30, start_utc=[START_NS] * 30),
     "no error": lambda: fleet_of(30, error_deg=[math.nan] * 30, verdict=[""] * 30),

@@ -184,7 +184,7 @@ def test_skill_of_every_flight_by_horizon(contents: Contents, fleet: FleetResult
     for number, horizon in enumerate(np.unique(horizons).tolist()):
         places, values = contents.scalars(f"/forecast/rms_by_flight/d0{number}_dots")
         assert (places == np.arange(1, FLIGHTS + 1)).all() and (values[:, 0] == rms[horizons == horizon]).all()
-    assert {f"/fleet/growth/RMS_radial_error/{mark}" for mark in ("00_dots/0", "01_curve")} <= set(contents.fixed)
+    assert {f"/fleet/growth/RMS_radial_error/{mark}" for mark in ("00_dots/0", "03_curve")} <= set(contents.fixed)
     assert "900" not in contents.text("/forecast/skill") and "last estimate" in contents.text("/forecast/skill")
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.results.fleet import FleetSkill
+from groundstation.results.fleet import WHOLE_FLEET, FleetSkill
 from groundstation.results.fleet_share import SkillOfFlight
 from groundstation.results.forecast_methods import FORECAST_METHODS
 
@@ -28,6 +28,8 @@ class _Sums:
 class SkillMerger:
     """Sums by method and horizon; flights are added one after the other.
 
+    ``aircraft`` is the one whose flights are added; empty: all.
+
     mean square = sum of starts x rms^2 / sum of starts, coverage likewise: what all starts in one array would give,
     never a mean of RMSE.
 
@@ -41,14 +43,13 @@ class SkillMerger:
     (13.0, 0.75, 4.0)
     """
 
-    def __init__(self) -> None:
+    def __init__(self, aircraft: str = WHOLE_FLEET) -> None:
+        self.aircraft = aircraft
         self._sums: dict[tuple[str, float], _Sums] = {}
 
     def add(self, row: SkillOfFlight) -> None:
         """Add a row of one flight."""
-        within = -1 if row.is_within is None else int(row.is_within)
-        columns = {name: np.array([value]) for name, value in vars(row).items() if name != "is_within"}
-        self.add_columns({**columns, "method": np.array([row.method], dtype=object), "is_within": np.array([within])})
+        self.add_columns(_columns_of(row))
 
     def add_columns(self, rows: Mapping[str, NDArray[Any]]) -> None:
         """Add rows of flights: the fields of :class:`SkillOfFlight` as columns.
@@ -71,7 +72,13 @@ class SkillMerger:
         """Return what was added, by method in the order of ``FORECAST_METHODS``, then by horizon."""
         order = {name: place for place, name in enumerate(FORECAST_METHODS)}
         keys = sorted(self._sums, key=lambda key: (order.get(key[0], len(order)), *key))
-        return tuple(_row(method, horizon_min, self._sums) for method, horizon_min in keys)
+        return tuple(_row(self.aircraft, method, horizon_min, self._sums) for method, horizon_min in keys)
+
+
+def _columns_of(row: SkillOfFlight) -> dict[str, NDArray[Any]]:
+    within = -1 if row.is_within is None else int(row.is_within)
+    columns = {name: np.array([value]) for name, value in vars(row).items() if name != "is_within"}
+    return {**columns, "method": np.array([row.method], dtype=object), "is_within": np.array([within])}
 
 
 def _groups(method: NDArray[Any], horizon_min: NDArray[np.float64]) -> dict[tuple[str, float], NDArray[np.intp]]:
@@ -95,7 +102,7 @@ def _added(total: float, values: NDArray[np.float64]) -> float:
     return float(np.cumsum(np.concatenate([[total], values]))[-1])
 
 
-def _row(method: str, horizon_min: float, all_sums: Mapping[tuple[str, float], _Sums]) -> FleetSkill:
+def _row(aircraft: str, method: str, horizon_min: float, all_sums: Mapping[tuple[str, float], _Sums]) -> FleetSkill:
     sums = all_sums[method, horizon_min]
     return FleetSkill(
         method,
@@ -109,4 +116,30 @@ def _row(method: str, horizon_min: float, all_sums: Mapping[tuple[str, float], _
         coverage_starts=sums.coverage_starts,
         flights_judged=sums.judged,
         flights_within=sums.within,
+        aircraft=aircraft,
     )
+
+
+class SkillMergers:
+    """Mergers of all flights, and of those of each named aircraft."""
+
+    def __init__(self) -> None:
+        self.whole = SkillMerger()
+        self._own: dict[str, SkillMerger] = {}
+
+    def add(self, row: SkillOfFlight, aircraft: str) -> None:
+        """Add a row of one flight, and the aircraft it is of."""
+        self.add_columns(_columns_of(row), np.array([aircraft]))
+
+    def add_columns(self, rows: Mapping[str, NDArray[Any]], aircraft: NDArray[np.str_]) -> None:
+        """Add rows of flights; ``aircraft`` is that of each row, empty where its log names none."""
+        self.whole.add_columns(rows)
+        for name in np.unique(aircraft[aircraft != WHOLE_FLEET]).tolist():
+            own = aircraft == name
+            self._own.setdefault(name, SkillMerger(name)).add_columns(
+                {key: values[own] for key, values in rows.items()}
+            )
+
+    def by_aircraft(self) -> tuple[FleetSkill, ...]:
+        """Return the rows of each aircraft, by its name."""
+        return tuple(row for name in sorted(self._own) for row in self._own[name].rows())

@@ -55,18 +55,18 @@ class AlgorithmRow:
     update: str
     two_sigma_r_m: float | None
     rms_m: float | None
-    nees: float | None
-    nees_low: float | None
-    nees_high: float | None
+    nees: float | None  #: Mean normalised squared horizontal error; 2 is honest, null without a truth.
+    nees_low: float | None  #: Lower 95 % limit of NEES by independent vehicles.
+    nees_high: float | None  #: Upper 95 % limit of NEES by independent vehicles.
     bound_ratio: float | None
     spectral_radius: float | None
     diverges: bool | None
     is_consistent: bool | None
-    accepted: int
-    gated: int
-    lost: int
-    messages: int
-    bytes_per_slot: float
+    accepted: int  #: Ranges used.
+    gated: int  #: Ranges that the gate refused.
+    lost: int  #: Ranges that could not be used.
+    messages: int  #: Broadcasts of the session that the algorithm needs.
+    bytes_per_slot: float  #: Bytes that the algorithm broadcasts, mean over the slots.
     expected_nees: float | None = None
     two_sigma_r_session_m: float | None = None
     refused: str = ""
@@ -76,17 +76,17 @@ class AlgorithmRow:
 class VehicleRow:
     """One vehicle under one algorithm: final sigma, errors against truth where known."""
 
-    vehicle: str
-    algorithm: str
-    epochs: int
-    sigma_north_m: float
-    sigma_east_m: float
-    two_sigma_r_m: float
-    rms_m: float | None
-    end_error_m: float | None
-    nees: float | None
-    clock_m: float | None
-    range_bias_m: float | None
+    vehicle: str  #: Name of the aircraft.
+    algorithm: str  #: Name of the algorithm.
+    epochs: int  #: Epochs of its answer.
+    sigma_north_m: float  #: Computed sigma north at the end.
+    sigma_east_m: float  #: Computed sigma east at the end.
+    two_sigma_r_m: float  #: Twice the root of the summed variances north and east at the end.
+    rms_m: float | None  #: RMS of the horizontal error; null without a truth.
+    end_error_m: float | None  #: Horizontal error at the end; null without a truth.
+    nees: float | None  #: Mean normalised squared horizontal error; 2 is honest.
+    clock_m: float | None  #: Clock error at the end, as a length; null where it is no state.
+    range_bias_m: float | None  #: Bias of its ranges at the end; null where it is no state.
 
 
 @dataclass(frozen=True)
@@ -97,29 +97,29 @@ class GeometryRow:
     that of its mean over a sliding interval.
     """
 
-    vehicle: str
-    sources_median: float
-    hdop_median: float | None
-    gdop_median: float | None
-    determinant_median: float
-    determinant_least: float
-    eigenvalue_least: float
-    gram_determinant_median: float
+    vehicle: str  #: Name of the aircraft.
+    sources_median: float  #: Sources ranged to, median.
+    hdop_median: float | None  #: Median of the horizontal dilution of precision.
+    gdop_median: float | None  #: Median of the geometric dilution of precision.
+    determinant_median: float  #: Median of det(H'H): sin squared of the angle for two sources.
+    determinant_least: float  #: Least det(H'H) of the session.
+    eigenvalue_least: float  #: Least eigenvalue of H'H of the session.
+    gram_determinant_median: float  #: Median determinant of H'H averaged over a sliding interval.
 
 
 @dataclass(frozen=True)
 class LinkRow:
     """One direction of one link: measurements, residuals of ``links_algorithm``."""
 
-    receiver: str
-    source: str
-    kind: str
-    ranges: int
-    used: int
-    gated: int
-    residual_mean_m: float | None
-    residual_rms_m: float | None
-    nis: float | None
+    receiver: str  #: Who measured.
+    source: str  #: Whom it ranged to.
+    kind: str  #: Aircraft, station or satellite.
+    ranges: int  #: Ranges logged.
+    used: int  #: Ranges that links_algorithm used.
+    gated: int  #: Ranges that its gate refused.
+    residual_mean_m: float | None  #: Mean of measured minus predicted.
+    residual_rms_m: float | None  #: RMS of measured minus predicted.
+    nis: float | None  #: Mean normalised innovation squared; 1 is honest.
 
 
 @dataclass(frozen=True)
@@ -157,15 +157,15 @@ class CooperativeResult(SessionAnswer):
     analysis: ClassVar[str] = "cooperative"
     frame: str
     default_algorithm: str
-    algorithms: tuple[AlgorithmRow, ...]
-    vehicles: tuple[VehicleRow, ...]
-    geometry: tuple[GeometryRow, ...] = ()
-    links: tuple[LinkRow, ...] = ()
+    algorithms: tuple[AlgorithmRow, ...]  #: Every algorithm over the whole session.
+    vehicles: tuple[VehicleRow, ...]  #: Every vehicle under every algorithm.
+    geometry: tuple[GeometryRow, ...] = ()  #: Directions to what each vehicle ranges to.
+    links: tuple[LinkRow, ...] = ()  #: Ranges and residuals of each link.
     links_algorithm: str = "centralised"
-    vehicle_names: tuple[str, ...] = ()
-    point_names: tuple[str, ...] = ()
-    duration_s: float = 0.0
-    slots: int = 0
+    vehicle_names: tuple[str, ...] = ()  #: Aircraft of the session.
+    point_names: tuple[str, ...] = ()  #: Ground stations of the session.
+    duration_s: float = 0.0  #: Length of the session.
+    slots: int = 0  #: Time slots of the data link.
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     stations: StationsAnswer | None = None
     figures: tuple[FigureData, ...] = ()

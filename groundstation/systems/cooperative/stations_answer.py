@@ -49,25 +49,25 @@ class StationRow:
         Where the answer puts it, off its place in the file, and the sigmas; None where it takes that place as exact.
     """
 
-    station: str
+    station: str  #: Name in the stations file.
     verdict: StationVerdict
-    ranges: int
+    ranges: int  #: Ranges to it.
     chance: float
-    shift_m: float | None
-    shift_sigma_m: float | None
-    shift_direction_deg: float | None
-    delay_m: float | None
-    delay_sigma_m: float | None
-    detectable_best_m: float | None
-    detectable_worst_m: float | None
+    shift_m: float | None  #: How far from its stated place the ranges put it; null where no shift can be seen.
+    shift_sigma_m: float | None  #: Standard deviation of the shift.
+    shift_direction_deg: float | None  #: True direction of the shift.
+    delay_m: float | None  #: By how much its ranges are too long, if that alone is wrong.
+    delay_sigma_m: float | None  #: Standard deviation of the delay.
+    detectable_best_m: float | None  #: Smallest shift that is found with 95 %, in the best direction.
+    detectable_worst_m: float | None  #: The same in the worst direction; null: none is.
     metres_per_metre: float
-    moves_most: str
-    stated_sigma_m: float
-    used_sigma_m: float
-    survey_north_m: float | None
-    survey_east_m: float | None
-    survey_sigma_north_m: float | None
-    survey_sigma_east_m: float | None
+    moves_most: str  #: Aircraft whose answer a shift of the station moves most.
+    stated_sigma_m: float  #: Sigma of its place as stated.
+    used_sigma_m: float  #: Sigma of its place as the answer takes it.
+    survey_north_m: float | None  #: Where the answer puts it, north of its stated place.
+    survey_east_m: float | None  #: Where the answer puts it, east of its stated place.
+    survey_sigma_north_m: float | None  #: Standard deviation of survey_north_m.
+    survey_sigma_east_m: float | None  #: Standard deviation of survey_east_m.
 
 
 @dataclass(frozen=True)
@@ -77,9 +77,9 @@ class ProtectionRow:
     ``worst_m`` over the session, ``end_m`` at its end.
     """
 
-    vehicle: str
-    worst_m: float
-    end_m: float
+    vehicle: str  #: Name of the aircraft.
+    worst_m: float  #: Largest bound of the session.
+    end_m: float  #: Bound at its end.
 
 
 @dataclass(frozen=True)
@@ -98,11 +98,11 @@ class DatumRow:
     is_told : bool
     """
 
-    datum: str
+    datum: str  #: Datum that the file may be in.
     shift_m: float
     evidence: float
     is_decidable: bool
-    is_told: bool
+    is_told: bool  #: Whether the session tells that it is.
 
 
 @dataclass(frozen=True)
@@ -121,9 +121,9 @@ class StationsAnswer:
         Factor by which readings of the stations tell less than as many independent ones.
     """
 
-    rows: tuple[StationRow, ...]
-    protection: tuple[ProtectionRow, ...]
-    datums: tuple[DatumRow, ...]
+    rows: tuple[StationRow, ...]  #: Every station as the ranges judge it.
+    protection: tuple[ProtectionRow, ...]  #: Bound of each aircraft's error by an undetected station.
+    datums: tuple[DatumRow, ...]  #: Whether the stations file is in another datum.
     raised: dict[str, float]
     repetition: float
 

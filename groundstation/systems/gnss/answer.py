@@ -49,12 +49,12 @@ class FixState:
     logged, or in fewer than ten rows.
     """
 
-    state: str
-    seconds: float
-    share: float
-    spells: int
-    longest_s: float
-    claimed_m: float | None = None
+    state: str  #: Kind of fix.
+    seconds: float  #: Time in it.
+    share: float  #: Share of the receiver's time.
+    spells: int  #: How often it was entered.
+    longest_s: float  #: Longest spell.
+    claimed_m: float | None = None  #: Median horizontal sigma claimed in it; null where not logged or too few.
 
 
 @dataclass(frozen=True)
@@ -65,13 +65,13 @@ class FixLoss:
     it; ``moved_m`` is between these.
     """
 
-    state: str
+    state: str  #: no fix, no_record (the row is missing) or log_silent (the whole log is).
     start_s: float
     end_s: float
-    seconds: float
-    speed_before_mps: float | None
-    speed_after_mps: float | None
-    moved_m: float | None
+    seconds: float  #: Length of it.
+    speed_before_mps: float | None  #: Speed of the last fix before.
+    speed_after_mps: float | None  #: Speed of the first fix after.
+    moved_m: float | None  #: Distance between these two.
 
 
 @dataclass(frozen=True)
@@ -83,12 +83,12 @@ class PositionJump:
     """
 
     time_s: float
-    size_m: float
-    along_m: float | None
-    up_m: float | None
-    state_before: str
-    state_after: str
-    time_shift_s: float | None = None
+    size_m: float  #: Length of the step.
+    along_m: float | None  #: Part along the motion.
+    up_m: float | None  #: Part upwards.
+    state_before: str  #: Kind of fix before.
+    state_after: str  #: Kind of fix after.
+    time_shift_s: float | None = None  #: Error of the time stamp that explains the step; null where the place is wrong.
 
 
 @dataclass(frozen=True)
@@ -123,19 +123,20 @@ class StandstillScatter:
     start_s: float
     end_s: float
     state: str
-    samples: int
-    scatter_m: float
-    up_scatter_m: float | None
-    claimed_m: float | None
-    up_claimed_m: float | None
+    samples: int  #: Number of positions.
+    scatter_m: float  #: Horizontal standard deviation about the mean, north and east together.
+    up_scatter_m: float | None  #: Vertical standard deviation about the mean.
+    claimed_m: float | None  #: Median horizontal sigma that the receiver claims.
+    up_claimed_m: float | None  #: Median vertical sigma that the receiver claims.
     correlation_s: float | None
     independent: float
-    speed_rms_mps: float | None
-    claimed_mps: float | None
+    speed_rms_mps: float | None  #: RMS speed shown while it stood.
+    claimed_mps: float | None  #: Median sigma of the velocity that the receiver claims.
     resolution_m: float
     is_held: bool
+    #: Flight second at which the standstill of the overview begins; null without one.
     phase_start_s: float | None = None
-    phase_end_s: float | None = None
+    phase_end_s: float | None = None  #: Flight second at which the standstill of the overview ends.
 
     @property
     def is_coarse(self) -> bool:
@@ -152,13 +153,13 @@ class VelocityAgainstPosition:
     of the position from fix to fix averages out of it; None without such a stretch.
     """
 
-    seconds: float
-    difference_rms_mps: float
-    left_rms_mps: float
-    lasting_rms_mps: float | None
-    claimed_mps: float | None
-    lag_s: float | None
-    lag_sigma_s: float | None
+    seconds: float  #: Time compared.
+    difference_rms_mps: float  #: RMS of velocity minus differenced position.
+    left_rms_mps: float  #: RMS that the delay does not explain.
+    lasting_rms_mps: float | None  #: RMS of the means over ten seconds; null without such a stretch.
+    claimed_mps: float | None  #: Median sigma of the velocity that the receiver claims.
+    lag_s: float | None  #: Positive: the velocity is later than the position; null where the motion does not tell.
+    lag_sigma_s: float | None  #: Standard deviation of the delay.
 
 
 @dataclass(frozen=True)
@@ -172,43 +173,43 @@ class GnssReceiver(Brief):
     from, empty where it is a field of the receiver's rows.
     """
 
-    topic: str
-    start_s: float
-    end_s: float
-    rows: int
-    rate_hz: float | None
-    repeated_rows: int
-    missed_epochs: int | None
-    is_kind_logged: bool
-    placeless_rows: int
-    states: tuple[FixState, ...]
-    first_fix_s: float | None
-    fix_share: float
-    lost_s: float
-    silent_s: float
-    losses: tuple[FixLoss, ...]
-    satellites_used: float | None
-    satellites_used_low: float | None
-    satellites_tracked: float | None
-    cn0_dbhz: float | None
-    cn0_low_dbhz: float | None
-    hdop: float | None
-    hdop_high: float | None
-    pdop: float | None
-    pdop_high: float | None
-    age_of_corrections_s: float | None
-    age_of_corrections_high_s: float | None
-    horizontal_sigma_m: float | None
-    vertical_sigma_m: float | None
-    velocity_sigma_mps: float | None
-    standstill: StandstillScatter | None
-    motion: VelocityAgainstPosition | None
-    jumps: tuple[PositionJump, ...]
-    jumps_found: int
-    behind_ins_s: float | None
-    behind_ins_sigma_s: float | None
-    standstills: tuple[StandstillScatter, ...] = ()
-    hdop_of: str = ""
+    topic: str  #: Topic of the receiver.
+    start_s: float  #: Flight second of its first row.
+    end_s: float  #: Flight second of its last row.
+    rows: int  #: Rows logged.
+    rate_hz: float | None  #: Usual rows a second.
+    repeated_rows: int  #: Rows that repeat an epoch.
+    missed_epochs: int | None  #: Epochs that its rate expects and the log lacks.
+    is_kind_logged: bool  #: Whether the kind of fix is logged.
+    placeless_rows: int  #: Rows that claim a fix without a place or a velocity.
+    states: tuple[FixState, ...]  #: Time in each kind of fix.
+    first_fix_s: float | None  #: Flight second of the first fix; null without any.
+    fix_share: float  #: Share of its time with a fix.
+    lost_s: float  #: Time without a fix after the first one.
+    silent_s: float  #: Time without a row after the first fix.
+    losses: tuple[FixLoss, ...]  #: Every time without a fix or row.
+    satellites_used: float | None  #: Median of the satellites used.
+    satellites_used_low: float | None  #: Satellites used that 95 % of the time exceeds.
+    satellites_tracked: float | None  #: Median of the satellites tracked.
+    cn0_dbhz: float | None  #: Median carrier to noise density.
+    cn0_low_dbhz: float | None  #: Carrier to noise density that 95 % of the time exceeds.
+    hdop: float | None  #: Median of the horizontal dilution of precision.
+    hdop_high: float | None  #: HDOP that 95 % of the time stays below.
+    pdop: float | None  #: Median of the position dilution of precision.
+    pdop_high: float | None  #: PDOP that 95 % of the time stays below.
+    age_of_corrections_s: float | None  #: Median age of the corrections.
+    age_of_corrections_high_s: float | None  #: Age that 95 % of the time stays below.
+    horizontal_sigma_m: float | None  #: Median horizontal sigma that the receiver claims.
+    vertical_sigma_m: float | None  #: Median vertical sigma that the receiver claims.
+    velocity_sigma_mps: float | None  #: Median sigma of the velocity that it claims.
+    standstill: StandstillScatter | None  #: Scatter over the longest standstill; null without one.
+    motion: VelocityAgainstPosition | None  #: Velocity against differenced position; null without motion.
+    jumps: tuple[PositionJump, ...]  #: Largest steps of the position that the velocity does not explain.
+    jumps_found: int  #: Number of such steps.
+    behind_ins_s: float | None  #: How much later than the INS it shows the motion; null where not observable.
+    behind_ins_sigma_s: float | None  #: Standard deviation of that delay.
+    standstills: tuple[StandstillScatter, ...] = ()  #: Longest standstill of each kind of fix, the best first.
+    hdop_of: str = ""  #: NMEA topic that HDOP comes from; empty where it is the receiver's own.
 
     @property
     def fixes(self) -> tuple[FixState, ...]:
@@ -254,19 +255,19 @@ class ReceiverPair:
     the first, by the track of the moving vehicle; ``lag_s`` how much later the second one shows the motion.
     """
 
-    first: str
-    second: str
-    seconds: float
-    distance_m: float
-    distance_scatter_m: float
-    up_m: float | None
-    up_scatter_m: float | None
-    claimed_m: float | None
-    velocity_difference_rms_mps: float | None
-    forward_m: float | None
-    right_m: float | None
-    lag_s: float | None
-    lag_sigma_s: float | None
+    first: str  #: Topic of one receiver.
+    second: str  #: Topic of the other.
+    seconds: float  #: Time with a fix of both.
+    distance_m: float  #: Median distance in the plane.
+    distance_scatter_m: float  #: Scatter of the distance: of two antennas on one vehicle it is constant.
+    up_m: float | None  #: Second above first, median.
+    up_scatter_m: float | None  #: Scatter of the height difference.
+    claimed_m: float | None  #: Horizontal sigma that both claim together.
+    velocity_difference_rms_mps: float | None  #: RMS of the difference of their velocities.
+    forward_m: float | None  #: Second antenna ahead of the first, by the track.
+    right_m: float | None  #: Second antenna right of the first, by the track.
+    lag_s: float | None  #: How much later the second shows the motion.
+    lag_sigma_s: float | None  #: Standard deviation of that delay.
 
 
 @dataclass(frozen=True)
@@ -274,9 +275,9 @@ class ReceiverTexts:
     """Texts of the receiver in one topic: how many, how many differ, the first one."""
 
     topic: str
-    count: int
-    different: int
-    first: str
+    count: int  #: Texts logged.
+    different: int  #: Different ones.
+    first: str  #: The first text.
 
 
 TELLING = frozenset(("rtk_fixed", "rtk_float", "ppp", "dgnss", "2d", "dead_reckoning"))
@@ -293,14 +294,14 @@ class GnssReception(Answer, WordsOfRecord):
 
     analysis: ClassVar[str] = "gnss"
 
-    grade: Grade
-    sentence: str
-    reasons: tuple[str, ...]
-    main: str
-    receivers: tuple[GnssReceiver, ...]
-    pairs: tuple[ReceiverPair, ...] = ()
-    texts: tuple[ReceiverTexts, ...] = ()
-    has_heading_source: bool = True
+    grade: Grade  #: good, warn or bad; unknown where nothing tells.
+    sentence: str  #: Summary for people, of the main receiver.
+    reasons: tuple[str, ...]  #: What the grade rests on.
+    main: str  #: Topic of the receiver with the most time with a fix.
+    receivers: tuple[GnssReceiver, ...]  #: Reception of each receiver.
+    pairs: tuple[ReceiverPair, ...] = ()  #: Every two receivers against each other.
+    texts: tuple[ReceiverTexts, ...] = ()  #: What the receivers wrote as text.
+    has_heading_source: bool = True  #: False where the log has one receiver alone and nothing with a heading.
     settings: dict[str, Any] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
 

@@ -38,19 +38,19 @@ class Standstill:
     start_s: float
     end_s: float
     samples: int
-    mean_north_mps: float
-    mean_east_mps: float
-    sigma_north_mps: float
-    sigma_east_mps: float
-    mean_of_speed_mps: float
-    speed_of_mean_mps: float
-    speed_bound97_mps: float
-    share_above_limit: float
-    ground_proof: str
-    white_sigma_mps: float | None = None
-    correlated_sigma_mps: float | None = None
-    correlation_time_s: float | None = None
-    velocity_is_held: bool = False
+    mean_north_mps: float  #: Mean GNSS velocity north while parked.
+    mean_east_mps: float  #: Mean GNSS velocity east while parked.
+    sigma_north_mps: float  #: Scatter of the north velocity about its mean.
+    sigma_east_mps: float  #: Scatter of the east velocity about its mean.
+    mean_of_speed_mps: float  #: Mean of the speeds: the second reading of the paper.
+    speed_of_mean_mps: float  #: Length of the mean velocity vector: the figure that is gated.
+    speed_bound97_mps: float  #: 97 % bound of speed_of_mean_mps by the effective number of samples.
+    share_above_limit: float  #: Share of the samples faster than a parked aircraft may seem.
+    ground_proof: str  #: What shows that the aircraft stood, in words.
+    white_sigma_mps: float | None = None  #: Part of the noise that differs from epoch to epoch.
+    correlated_sigma_mps: float | None = None  #: Part of the noise that lasts.
+    correlation_time_s: float | None = None  #: Time over which the lasting part decays.
+    velocity_is_held: bool = False  #: The receiver freezes its velocity at rest: its error cannot be seen.
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,11 @@ class TaxiSegment:
 
     start_s: float
     end_s: float
-    samples: int
-    mean_track_deg: float
-    mean_speed_mps: float
-    error_deg: float
-    sigma_deg: float
+    samples: int  #: GNSS epochs used in it.
+    mean_track_deg: float  #: Mean GNSS track, true.
+    mean_speed_mps: float  #: Mean ground speed.
+    error_deg: float  #: INS heading minus track on this segment alone.
+    sigma_deg: float  #: Standard error of this segment's error.
 
 
 def seconds_of_epochs(is_meant: BoolArray, interval_s: float) -> float:
@@ -88,8 +88,8 @@ class HeadingStep:
     The size is heading after minus heading before.
     """
 
-    time_s: float
-    size_deg: float
+    time_s: float  #: Flight second of the first sample after it.
+    size_deg: float  #: Heading after minus heading before.
 
 
 @dataclass(frozen=True)
@@ -99,10 +99,10 @@ class TaxiWind:
     The origin is ``log`` or the METAR line.
     """
 
-    north_mps: float
-    east_mps: float
-    sigma_mps: float
-    origin: str
+    north_mps: float  #: Velocity of the air towards north.
+    east_mps: float  #: Velocity of the air towards east.
+    sigma_mps: float  #: Standard deviation of either component.
+    origin: str  #: log, or the METAR line.
 
 
 @dataclass(frozen=True)
@@ -114,12 +114,12 @@ class RunwayCheck:
 
     schema_name: ClassVar[str] = "runway"
 
-    name: str
-    true_bearing_deg: float
-    ins_heading_deg: float
-    error_deg: float
-    sigma_deg: float
-    difference_deg: float
+    name: str  #: Runway as the site file or the table names it.
+    true_bearing_deg: float  #: True bearing of the runway.
+    ins_heading_deg: float  #: INS heading on line-up or take-off run.
+    error_deg: float  #: INS heading minus runway bearing.
+    sigma_deg: float  #: Standard deviation of that error.
+    difference_deg: float  #: This error minus that by taxi.
 
 
 @dataclass(frozen=True)
@@ -150,12 +150,12 @@ class HeadingByStates:
     schema_name: ClassVar[str] = "by_states"
 
     by: str
-    error_deg: float
-    sigma_deg: float
+    error_deg: float  #: INS heading minus that of the states.
+    sigma_deg: float  #: Standard deviation, with the states', the mounting's and the scatter.
     confidence95_deg: tuple[float, float]
     samples: int
     correlation: float | None
-    difference_deg: float
+    difference_deg: float  #: Error by taxi minus this one.
     agrees: bool
 
 
@@ -168,13 +168,13 @@ class OnboardComparison:
 
     schema_name: ClassVar[str] = "onboard"
 
-    heading_error_deg: float | None
-    precision_deg: float | None
-    quality_deg: float | None
-    cycles: float | None
-    correction_entered_deg: float | None
-    status: str
-    difference_error_deg: float | None
+    heading_error_deg: float | None  #: Heading error that the aircraft found.
+    precision_deg: float | None  #: The paper's e as the aircraft computed it.
+    quality_deg: float | None  #: The paper's quality figure as the aircraft computed it.
+    cycles: float | None  #: Cycles of averaging on board.
+    correction_entered_deg: float | None  #: Correction that stood in the INS while the log was made.
+    status: str  #: State of the on-board procedure, as logged.
+    difference_error_deg: float | None  #: Heading error found on board minus ours.
 
 
 @dataclass(frozen=True)
@@ -242,58 +242,65 @@ class HeadingResult(Answer, OnTaxi, HeadingByTrack, LatencyByTurns):
     schema_name: ClassVar[str] = analysis
     taxi_serves: ClassVar[str] = "the heading error"
 
-    ins_topic: str
-    gnss_topic: str
+    ins_topic: str  #: Topic of the INS whose heading is judged.
+    gnss_topic: str  #: Topic of the GNSS whose velocity gives the track.
     heading_source: str
+    #: accept: type the correction; advisory: good to the interval; reject; extend: taxi longer; undecided.
     verdict: Verdict
-    verdict_reason: str
-    error_deg: float
-    standard_error_deg: float
+    verdict_reason: str  #: Gate or figure that decided it, for people.
+    error_deg: float  #: INS heading minus true heading: robust, weighted by speed, corrected by.
+    standard_error_deg: float  #: Standard error with correlated errors, spread of segments and steady sideslip in it.
+    #: 95 % interval of the error [low, high], of the airframe as a theodolite judges it.
     confidence95_deg: tuple[float, float]
     paper_error_deg: float
     precision_deg: float
     quality_deg: float
     estimate_sd_deg: float
-    samples: int
-    taxi_seconds: float
-    drift_deg_per_h: float | None
-    drift_sigma_deg_per_h: float | None
+    samples: int  #: Distinct GNSS epochs used.
+    taxi_seconds: float  #: Straight taxi that was used.
+    drift_deg_per_h: float | None  #: Growth of the error along the taxi.
+    drift_sigma_deg_per_h: float | None  #: Standard deviation of the drift.
     correction_deg: float | None
-    entry_step_deg: float = field(metadata={"above": 0})
-    gates: tuple[Gate, ...]
-    standstill: Standstill | None
-    segments: tuple[TaxiSegment, ...]
-    directions: tuple[TaxiSegment, ...] = ()
-    lever_arm_m: float | None = None
-    lever_arm_sigma_m: float | None = None
-    lever_arm_origin: str = "not observable"
-    time_offset_s: float | None = None
-    time_offset_sigma_s: float | None = None
-    latency_used_s: float | None = None
-    latency_used_sigma_s: float | None = None
+    entry_step_deg: float = field(metadata={"above": 0})  #: Step to which the correction is rounded: that of the panel.
+    gates: tuple[Gate, ...]  #: Conditions of the verdict, each with figure and limit.
+    standstill: Standstill | None  #: GNSS velocity at rest before the taxi; null where the flight shows none.
+    segments: tuple[TaxiSegment, ...]  #: Straight parts of the taxi, each with an error of its own.
+    directions: tuple[TaxiSegment, ...] = ()  #: Segments of about one direction, joined.
+    lever_arm_m: float | None = None  #: GNSS antenna ahead of the main-gear axle, positive forward.
+    lever_arm_sigma_m: float | None = None  #: Standard deviation of the arm.
+    lever_arm_origin: str = "not observable"  #: aircraft file, estimated or not observable.
+    time_offset_s: float | None = None  #: Delay of GNSS behind the INS that the turns still show, after latency_used_s.
+    time_offset_sigma_s: float | None = None  #: Standard deviation of that delay.
+    latency_used_s: float | None = None  #: Delay of GNSS behind the INS that was taken out; null where none was.
+    latency_used_sigma_s: float | None = None  #: Standard deviation of latency_used_s.
+    #: Source of latency_used_s; empty where nothing was shifted.
     latency_origin: str = field(default="", metadata={"one_of": ("", "aircraft file", "motion")})
-    parking_ins_heading_deg: float | None = None
+    parking_ins_heading_deg: float | None = None  #: INS heading while parked, as logged.
+    #: The same with the error of that time taken off: true heading of the airframe.
     parking_heading_deg: float | None = None
-    parking_sigma_deg: float | None = None
-    reference_parking_heading_deg: float | None = None
-    reference_residual_arcmin: float | None = None
-    runway: tuple[RunwayCheck, ...] = ()
+    parking_sigma_deg: float | None = None  #: Standard deviation of the corrected parking heading.
+    reference_parking_heading_deg: float | None = None  #: Parking heading by theodolite or stand, where one is stated.
+    reference_residual_arcmin: float | None = None  #: Corrected parking heading minus its reference.
+    runway: tuple[RunwayCheck, ...] = ()  #: INS heading against the runway's bearing: a second reference.
+    #: What the aircraft computed itself, beside ours; null where it is not logged.
     onboard: OnboardComparison | None = None
     uncorrected_error_deg: float | None = None
     confidence95_measured_deg: tuple[float, float] | None = None
-    steady_sigma_deg: float | None = None
+    steady_sigma_deg: float | None = None  #: Part of the standard error that steady sideslip makes.
+    #: Source of the prior sigmas of sideslip.
     steady_origin: str = field(default="", metadata={"one_of": ("", "aircraft file", "shipped figures")})
     interval_parts: tuple[IntervalPart, ...] = ()
-    platform_error_deg: float | None = None
+    platform_error_deg: float | None = None  #: Azimuth of the INS itself minus true: the mounting is taken off.
+    #: Standard error of the platform's, with the sigma of the mounting.
     platform_standard_error_deg: float | None = None
-    platform_confidence95_deg: tuple[float, float] | None = None
-    wind: TaxiWind | None = None
-    aircraft_class: str = ""
-    sideslip_deg: float | None = None
+    platform_confidence95_deg: tuple[float, float] | None = None  #: 95 % interval of the platform's error [low, high].
+    wind: TaxiWind | None = None  #: Wind used for sideslip; null where none is known.
+    aircraft_class: str = ""  #: Class whose factor turned crosswind to sideslip; empty without wind.
+    sideslip_deg: float | None = None  #: Mean sideslip, heading minus track, that was taken off; null without wind.
     mean_direction: tuple[float, float] | None = None
-    segment_spread_deg: float | None = None
-    wander_spread_deg: float | None = None
-    wander_s: float | None = None
+    segment_spread_deg: float | None = None  #: Error that each segment has of its own, one sigma.
+    wander_spread_deg: float | None = None  #: Wander of INS heading minus path within a segment, one sigma.
+    wander_s: float | None = None  #: Correlation time of the wander.
     steps: tuple[HeadingStep, ...] = ()
     reference_time_s: float | None = None
     by_states: HeadingByStates | None = None

@@ -3,29 +3,35 @@
 Overlaid with the fitted normal (figure 3 of the paper).
 """
 
-import numpy as np
-
 from groundstation.chapters.fleet.common import aircraft_name
 from groundstation.chapters.parts import Figure, Grid, Head, Note, Part, Section
 from groundstation.chapters.wording import number
 from groundstation.results.fleet import FleetResults
 
-LEAD = (
-    "INS heading − GNSS track of the used samples, flight by flight, on one scale with the normal fitted to all: "
-    "figure 3 of the paper over this fleet."
-)
+LEAD = "INS heading − GNSS track of the used samples, flight by flight, on one scale with the normal fitted to "
 
 
 def build(fleet: FleetResults) -> Section:
     """Build the chapter."""
+    lead = f"{LEAD}{_of_whom(fleet)}"
     if not len(fleet.densities):
         note = Note("No flight has samples of the heading error.", "unknown")
-        return Section("densities", "Density of the heading error", LEAD, (note,))
+        return Section("densities", "Density of the heading error", lead, (note,))
     parts: list[Part] = [Figure("fleet.densities")]
-    if len([name for name in np.unique(fleet.densities.aircraft) if name]) > 1:
+    if len(fleet.densities.named) > 1:
         parts.append(Figure("fleet.densities_by_aircraft"))
     parts.append(_normals(fleet))
-    return Section("densities", "Density of the heading error", LEAD, parts)
+    return Section("densities", "Density of the heading error", lead, parts)
+
+
+def _of_whom(fleet: FleetResults) -> str:
+    """Return the end of the lead: whose samples the normal is fitted to."""
+    names = fleet.densities.named
+    if len(names) > 1:
+        return "those of each aircraft: figure 3 of the paper. Samples of different aircraft are never merged."
+    alone = len(names) == 1 and set(fleet.densities.aircraft.tolist()) == set(names)
+    whose = f" All are of {aircraft_name(names[0])}." if alone else ""
+    return f"all: figure 3 of the paper over this fleet.{whose}"
 
 
 def _normals(fleet: FleetResults) -> Grid:
@@ -42,7 +48,7 @@ def _normals(fleet: FleetResults) -> Grid:
         for place, one in enumerate(fleet.normals)
         if place or len(fleet.normals) < 3
     ]
-    caption = "Merged from number, mean and sum of squares of each flight: the same as all samples in one array."
+    caption = "Merged from number, mean and sum of squares of each flight: the same as the samples in one array."
     return Grid("Fitted normals", heads, rows, caption)
 
 

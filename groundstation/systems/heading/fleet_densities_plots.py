@@ -10,7 +10,7 @@ from groundstation.chapters.fleet.common import aircraft_name, plural
 from groundstation.chapters.plots.common import label
 from groundstation.chapters.plots.fleet.common import left_out, roles_of, rows_shown
 from groundstation.chapters.wording import number
-from groundstation.plots.marks import AnyMark, Band, Curve, Emphasis, Floats, Role
+from groundstation.plots.marks import SERIES, AnyMark, Band, Curve, Emphasis, Floats, Role, series
 from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import padded
 from groundstation.results.fleet import Densities, FittedNormal, FleetResults
@@ -25,27 +25,61 @@ LEFT_OUT = 0.001  # share of all samples that each end of the axis may leave out
 
 
 def overlay(fleet: FleetResults) -> Plot:
-    """Return the density of every flight over each other."""
-    densities, normal, roles = fleet.densities, fleet.normal(), roles_of(fleet)
+    """Return the density of every flight over each other, and of each aircraft."""
+    densities, roles = fleet.densities, roles_of(fleet)
     low, high = _span(densities)
-    marks, top = _flights(densities, np.arange(len(densities)), MOST_LINES, roles, is_named=True)
-    x, y = _outline(densities, densities.pooled_per_deg)
-    marks.append(Curve(x=x, y=y, role="faint", name="all samples", dash="dashed", emphasis="bold"))
-    normal = normal if len(fleet.normals) < 3 else None
-    marks += _normal(normal, low, high, "fitted normal")
-    fitted = ""
-    if normal is not None:
-        told = f"mean {angle(normal.mean_deg)} and σ {number(normal.sigma_deg, 3, '°')}"
-        fitted = f"; black: the normal fitted to them with {told}"
+    if len(densities.named) > 1:
+        marks, top, told = _of_each(densities, roles)
+    else:
+        marks, top, told = _of_all(fleet, low, high)
     across = Axis("INS heading − GNSS track, °", low=low, high=high)
     return Plot(
         "fleet.densities",
         "Density of every flight",
-        f"{_how_drawn(len(densities), roles)} Dashed: all {number(int(densities.samples.sum()), 0)} samples"
-        f"{fitted}.{_beyond(densities, low, high)}",
+        f"{told}{_beyond(densities, low, high)}",
         "Densities of the heading error of the flights over each other with the fitted normal curve.",
         one_panel(Panel(marks, across, Axis("probability density, 1/°", low=0.0, high=1.08 * top)), 69.0),
     )
+
+
+def _of_all(fleet: FleetResults, low: float, high: float) -> tuple[list[AnyMark], float, str]:
+    """Return marks of a fleet of one aircraft, the height of the axis, the caption."""
+    densities, normal, roles = fleet.densities, fleet.normal(), roles_of(fleet)
+    every = np.arange(len(densities))
+    marks, top = _flights(densities, every, MOST_LINES, roles, densities.pooled_per_deg, is_named=True)
+    marks.append(_all_samples(densities, densities.pooled_per_deg, "faint", "all samples"))
+    marks += _normal(normal, low, high, "fitted normal")
+    fitted = ""
+    if normal is not None:
+        mean_and_sigma = f"mean {angle(normal.mean_deg)} and σ {number(normal.sigma_deg, 3, '°')}"
+        fitted = f"; black: the normal fitted to them with {mean_and_sigma}"
+    told = f"{_how_drawn(len(densities), roles)} Dashed: all {number(int(densities.samples.sum()), 0)} samples{fitted}."
+    return marks, top, told
+
+
+def _of_each(densities: Densities, roles: dict[str, Role]) -> tuple[list[AnyMark], float, str]:
+    """Return marks of a fleet of several aircraft, the height of the axis, the caption."""
+    counts = {name: int(np.sum(densities.aircraft == name)) for name in densities.named}
+    shown = rows_shown(counts, len(SERIES))
+    own = roles if _tell_apart(roles) else {**roles, **{name: series(place) for place, name in enumerate(shown)}}
+    pooled = {name: densities.pooled_of(name) for name in shown}
+    top = max(float(curve.max()) for curve in pooled.values())
+    marks: list[AnyMark] = []
+    rows = np.flatnonzero(np.isin(densities.aircraft, [*shown, ""]))
+    is_drawn = len(rows) <= MOST_LINES
+    if is_drawn:
+        marks, top = _flights(densities, rows, MOST_LINES, own, pooled[shown[0]], is_named=False)
+        top = max(top, *(float(curve.max()) for curve in pooled.values()))
+    for name, curve in pooled.items():
+        marks.append(_all_samples(densities, curve, own[name], label(aircraft_name(name), 12)))
+    single = "thin: each flight" if is_drawn else f"{plural(len(rows), 'flight')} are not drawn by themselves"
+    told = f"Dashed: the samples of an aircraft together; {single}.{left_out(len(shown), len(counts))}"
+    return marks, top or 1.0, told
+
+
+def _all_samples(densities: Densities, density: Floats, role: Role, name: str = "") -> Curve:
+    x, y = _outline(densities, density)
+    return Curve(x=x, y=y, role=role, name=name, dash="dashed", emphasis="bold")
 
 
 def _how_drawn(flights: int, roles: dict[str, Role]) -> str:
@@ -87,11 +121,14 @@ def _outline(densities: Densities, density: Floats) -> tuple[Floats, Floats]:
 
 
 def _flights(
-    densities: Densities, rows: NDArray[np.intp], most: int, roles: dict[str, Role], *, is_named: bool
+    densities: Densities, rows: NDArray[np.intp], most: int, roles: dict[str, Role], pooled: Floats, *, is_named: bool
 ) -> tuple[list[AnyMark], float]:
-    """Return flights as lines, or as bands where they are many, and the height of the axis."""
+    """Return flights as lines, or as bands where they are many, and the height of the axis.
+
+    ``pooled`` is the density of their samples together: the axis holds it.
+    """
     if len(rows) > most:
-        return _bands(densities, rows, is_named=is_named)
+        return _bands(densities, rows, pooled, is_named=is_named)
     told: set[str] = set()
     is_coloured = is_named and _tell_apart(roles)
     marks: list[AnyMark] = []
@@ -102,10 +139,12 @@ def _flights(
         x, y = _outline(densities, densities.density_per_deg[row])
         marks.append(Curve(x=x, y=y, role=roles[name], name=text, emphasis="faint"))
     peaks = densities.density_per_deg[rows].max(axis=1)
-    return marks, float(max(np.quantile(peaks, 0.98), np.max(densities.pooled_per_deg))) or 1.0
+    return marks, float(max(np.quantile(peaks, 0.98), np.max(pooled))) or 1.0
 
 
-def _bands(densities: Densities, rows: NDArray[np.intp], *, is_named: bool) -> tuple[list[AnyMark], float]:
+def _bands(
+    densities: Densities, rows: NDArray[np.intp], pooled: Floats, *, is_named: bool
+) -> tuple[list[AnyMark], float]:
     shares = (*(share for low, high, _ in BANDS for share in (low, high)), 0.5)
     curves = np.quantile(densities.density_per_deg[rows], shares, axis=0)
     marks: list[AnyMark] = []
@@ -115,7 +154,7 @@ def _bands(densities: Densities, rows: NDArray[np.intp], *, is_named: bool) -> t
         marks.append(Band(x=densities.center_deg, low=lower, high=upper, role="ins", name=text, emphasis=heavy))
     x, y = _outline(densities, curves[-1])
     marks.append(Curve(x=x, y=y, role="ins", emphasis="thin"))
-    return marks, float(max(curves.max(), np.max(densities.pooled_per_deg))) or 1.0
+    return marks, float(max(curves.max(), np.max(pooled))) or 1.0
 
 
 def _normal(normal: FittedNormal | None, low: float, high: float, text: str) -> list[AnyMark]:
@@ -137,7 +176,9 @@ def by_aircraft(fleet: FleetResults) -> Plot:
     panels = []
     for place, name in enumerate(shown):
         rows = np.flatnonzero(densities.aircraft == name)
-        marks, top = _flights(densities, rows, MOST_LINES_OF_A_PANEL, roles, is_named=False)
+        pooled = densities.pooled_of(name)
+        marks, top = _flights(densities, rows, MOST_LINES_OF_A_PANEL, roles, pooled, is_named=False)
+        marks.append(_all_samples(densities, pooled, "faint"))
         marks += _normal(fleet.normal(name), low, high, "")
         y = Axis("" if place % PANEL_COLUMNS else "1/°", low=0.0, high=1.08 * top)
         x_title = "INS heading − GNSS track, °" if place + PANEL_COLUMNS >= len(shown) else ""
@@ -147,8 +188,9 @@ def by_aircraft(fleet: FleetResults) -> Plot:
     return Plot(
         "fleet.densities_by_aircraft",
         "Density by aircraft",
-        f"The same for each aircraft; black: the normal fitted to its samples. More than {MOST_LINES_OF_A_PANEL} "
-        f"flights are drawn as bands that hold 90 % and 50 % of them at each place.{left_out(len(shown), len(counts))}",
+        "The same for each aircraft; dashed: all its samples; black: their fitted normal. More than "
+        f"{MOST_LINES_OF_A_PANEL} flights are drawn as bands that hold 90 % and 50 % of them at each place."
+        f"{left_out(len(shown), len(counts))}",
         "A panel for each aircraft with the densities of its flights and the normal fitted to them.",
         tuple(Row(tuple(panels[at : at + PANEL_COLUMNS]), 31.0, columns=PANEL_COLUMNS) for at in starts),
     )

@@ -66,28 +66,28 @@ class Measure:
         It is set or not, or one of a few states: its number says nothing to people.
     """
 
-    check: str
-    quantity: str
-    title: str
-    sensor: str
-    source: str
+    check: str  #: Key of the check that it belongs to.
+    quantity: str  #: Key of the threshold.
+    title: str  #: Quantity for people.
+    sensor: str  #: Which of several; empty where there is one.
+    source: str  #: Topic and field.
     unit: str
     verdict: Verdict
     rule: Literal["share", "median", "mean", "rise"]
     figure: float | None
-    worst: float
-    worst_at_s: float
+    worst: float  #: Worst value in the air.
+    worst_at_s: float  #: Flight second of the worst.
     median: float | None
     mean: float | None
-    amber_share: float | None
-    red_share: float | None
-    amber_share_log: float | None
-    red_share_log: float | None
+    amber_share: float | None  #: Share of the time in the air beyond the amber limit, red included.
+    red_share: float | None  #: Share of the time in the air beyond the red limit.
+    amber_share_log: float | None  #: The same of the whole log, amber.
+    red_share_log: float | None  #: The same of the whole log, red.
     logged_share: float
-    span_start_s: float | None
-    span_end_s: float | None
-    amber: float | None
-    red: float | None
+    span_start_s: float | None  #: Flight second at which the longest bad span begins.
+    span_end_s: float | None  #: Flight second at which the longest bad span ends.
+    amber: float | None  #: Limit of a warning.
+    red: float | None  #: Limit of a failure.
     is_below: bool
     threshold_source: str
     is_flag: bool = False
@@ -142,13 +142,13 @@ class Check(Brief):
     the first one that decided.
     """
 
-    key: str
-    title: str
-    verdict: Verdict
-    reason: str
-    measures: tuple[Measure, ...]
-    events_in_air: int = 0
-    first_event_s: float | None = None
+    key: str  #: Stable name for scripts.
+    title: str  #: Name for people.
+    verdict: Verdict  #: pass, warn, fail or not_logged.
+    reason: str  #: What decided it, with figure and limit.
+    measures: tuple[Measure, ...]  #: Quantities behind it.
+    events_in_air: int = 0  #: Warnings and failures logged in the air.
+    first_event_s: float | None = None  #: Flight second of the first one that decided; null without any.
 
     @property
     def is_told(self) -> bool:
@@ -178,11 +178,11 @@ class Happening:
     """Something that the autopilot logged or did, flight seconds, with its grade."""
 
     time_s: float
-    check: str
-    grade: Literal["info", "warn", "fail"]
-    text: str
-    source: str
-    in_the_air: bool
+    check: str  #: Key of the check that it belongs to.
+    grade: Literal["info", "warn", "fail"]  #: info, warn or fail.
+    text: str  #: What happened, for people.
+    source: str  #: Topic it is from.
+    in_the_air: bool  #: Whether it was in the air.
 
 
 @dataclass(frozen=True)
@@ -193,15 +193,15 @@ class SettingFound:
     topic of the parameters.
     """
 
-    name: str
-    what: str
+    name: str  #: Parameter of the autopilot.
+    what: str  #: What it sets, for people.
     unit: str
-    stated: float
-    found: float | None
-    sigma: float | None
-    verdict: Verdict
-    reason: str
-    source: str
+    stated: float  #: Value in the autopilot.
+    found: float | None  #: Value that the flight shows; null where it does not.
+    sigma: float | None  #: Standard deviation of the value found.
+    verdict: Verdict  #: pass, warn, fail or not_logged.
+    reason: str  #: Why there is no value, or what it rests on.
+    source: str  #: Topic of the parameters.
 
     @property
     def told(self) -> str:
@@ -214,9 +214,9 @@ class SettingFound:
 class ChangedParameter:
     """Parameter that differs from its default, by the log itself."""
 
-    name: str
-    value: float
-    default: float
+    name: str  #: Parameter of the autopilot.
+    value: float  #: Value in the flight.
+    default: float  #: Value as shipped, by the log itself.
 
 
 @dataclass(frozen=True)
@@ -237,12 +237,12 @@ class MotorOutput:
     """
 
     number: int
-    low: float
-    high: float
-    mean: float
+    low: float  #: Least output in flight.
+    high: float  #: Greatest output in flight.
+    mean: float  #: Mean output while judged.
     thrust: float
-    at_low_s: float
-    at_high_s: float
+    at_low_s: float  #: Seconds at its lowest.
+    at_high_s: float  #: Seconds at its highest.
 
 
 @dataclass(frozen=True)
@@ -253,13 +253,13 @@ class AttitudeLoss:
     propeller is suspect, None without one; ``all_full``: every motor was near its greatest thrust.
     """
 
-    start_s: float
-    judged_s: float = 0.0
-    unit: str = ""
-    source: str = ""
-    motors: tuple[MotorOutput, ...] = ()
-    suspect: int | None = None
-    all_full: bool = False
+    start_s: float  #: Flight second of the loss.
+    judged_s: float = 0.0  #: Length of the time that the motors are judged over.
+    unit: str = ""  #: Unit of the motor outputs.
+    source: str = ""  #: Topic that shows it.
+    motors: tuple[MotorOutput, ...] = ()  #: Commands to each motor then; empty where they are not logged.
+    suspect: int | None = None  #: Output whose motor, ESC or propeller is suspect; null without one.
+    all_full: bool = False  #: Every motor was near its greatest thrust.
 
     @property
     def told(self) -> str:
@@ -297,23 +297,23 @@ class AutopilotHealth(Answer):
 
     analysis: ClassVar[str] = "health"
 
-    verdict: Verdict
-    sentence: str
-    autopilot: str
-    judged_over: str
-    judged_by: str
-    judged_s: float
-    checks: tuple[Check, ...]
-    happenings: tuple[Happening, ...] = ()
-    happenings_left_out: int = 0
-    settings_found: tuple[SettingFound, ...] = ()
-    parameters_logged: int = 0
-    has_defaults: bool = False
-    differing: tuple[ChangedParameter, ...] = ()
-    estimator: str = ""
-    estimator_source: str = ""
-    loss: AttitudeLoss | None = None
-    cannot_taxi: bool = False
+    verdict: Verdict  #: Worst of the checks.
+    sentence: str  #: Summary for people.
+    autopilot: str  #: Autopilot and version, as logged.
+    judged_over: str  #: Time judged: in the air, while armed, or the whole log.
+    judged_by: str  #: What showed that time.
+    judged_s: float  #: Length of the time judged.
+    checks: tuple[Check, ...]  #: Every check, with its quantities.
+    happenings: tuple[Happening, ...] = ()  #: What the autopilot logged or did, in order of time.
+    happenings_left_out: int = 0  #: Number of happenings beyond those listed.
+    settings_found: tuple[SettingFound, ...] = ()  #: Settings of the autopilot against what the flight shows.
+    parameters_logged: int = 0  #: Number of parameters in the log.
+    has_defaults: bool = False  #: Whether the log tells the defaults.
+    differing: tuple[ChangedParameter, ...] = ()  #: Parameters off their defaults.
+    estimator: str = ""  #: Filter that flew the aircraft; empty where the log does not tell.
+    estimator_source: str = ""  #: Parameter or field that tells it.
+    loss: AttitudeLoss | None = None  #: First loss of control of attitude; null without one.
+    cannot_taxi: bool = False  #: The log is of a multirotor or helicopter.
     settings: dict[str, Any] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
 

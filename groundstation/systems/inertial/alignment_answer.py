@@ -40,16 +40,17 @@ class InsAlignment:
 
     schema_name: ClassVar[str] = "alignment_before_navigation"
 
+    #: gyrocompass, stored_heading, in_motion, gnss_aided or unknown.
     kind: AlignmentKind = field(metadata={"one_of": ALIGNMENT_KINDS})
     basis: AlignmentBasis = field(metadata={"one_of": ALIGNMENT_BASES})
     reason: str
-    start_s: float | None = None
-    end_s: float | None = None
-    length_s: float | None = None
+    start_s: float | None = None  #: Flight second of its beginning, as far as the log shows it.
+    end_s: float | None = None  #: Flight second of its end.
+    length_s: float | None = None  #: From beginning to end; a lower bound where is_cut.
     is_cut: bool = False
     is_moved: bool | None = None
-    moved_m: float | None = None
-    moved_at_s: float | None = None
+    moved_m: float | None = None  #: Largest distance from its place at the beginning.
+    moved_at_s: float | None = None  #: Flight second at which it first moved.
 
 
 @dataclass(frozen=True)
@@ -62,11 +63,13 @@ class ErrorsAtStart:
 
     schema_name: ClassVar[str] = "errors_at_start"
 
+    #: Tilt of the north channel at the start, positive where its velocity error falls.
     tilt_north_arcsec: Measured | None
+    #: Tilt of the east channel at the start, positive where its velocity error falls.
     tilt_east_arcsec: Measured | None
-    azimuth_deg: Measured | None
-    tilt_reason: str
-    azimuth_reason: str
+    azimuth_deg: Measured | None  #: Azimuth error at the start.
+    tilt_reason: str  #: Why there is no tilt; empty where there is one.
+    azimuth_reason: str  #: Why there is no azimuth error; empty where there is one.
 
 
 @dataclass(frozen=True)
@@ -90,8 +93,8 @@ class StandingDrift:
 
     start_s: float
     end_s: float
-    north_mps_per_min: Measured
-    east_mps_per_min: Measured
+    north_mps_per_min: Measured  #: Slope of the velocity north.
+    east_mps_per_min: Measured  #: Slope of the velocity east.
     size_mps_per_min: Measured
     limit_mps_per_min: float | None = None
     is_above: bool = False
@@ -125,11 +128,11 @@ class InsShutdown:
 
     is_parked: bool
     reason: str
-    start_s: float | None = None
-    end_s: float | None = None
+    start_s: float | None = None  #: Flight second at which the stand at the end begins.
+    end_s: float | None = None  #: Flight second at which it ends.
     residual_speed_mps: Measured | None = None
     position_error_m: Measured | None = None
-    position_at_s: float | None = None
+    position_at_s: float | None = None  #: Flight second at the end of that minute.
     hours: float | None = None
     terminal_rate_nmiph: Measured | None = None
 
@@ -154,15 +157,16 @@ class InsRealignment:
 
     schema_name: ClassVar[str] = "ins_realignment"
 
-    start_s: float
-    end_s: float
+    start_s: float  #: Flight second from which the INS did not navigate; end_s where its position was set.
+    end_s: float  #: Flight second from which it navigated again.
     is_aligned: bool
+    #: standing, moving or unknown: what the aircraft did.
     place: GroundPlace = field(metadata={"one_of": GROUND_PLACES})
-    position_step_m: Measured | None = None
-    velocity_step_mps: Measured | None = None
-    heading_step_deg: Measured | None = None
-    rate_before_nmiph: float | None = None
-    rate_after_nmiph: float | None = None
+    position_step_m: Measured | None = None  #: Length of the position error after less before.
+    velocity_step_mps: Measured | None = None  #: Length of the velocity error after less before.
+    heading_step_deg: Measured | None = None  #: Heading after less before.
+    rate_before_nmiph: float | None = None  #: Slope of the position error since the start or the reset before.
+    rate_after_nmiph: float | None = None  #: Slope of the position error since this one.
 
 
 @dataclass(frozen=True)
@@ -185,16 +189,16 @@ class GroundResult(Answer):
     analysis: ClassVar[str] = "ins_ground"
     schema_name: ClassVar[str] = analysis
 
-    ins_topic: str
-    gnss_topic: str
-    kind: str
-    ins_class: str
+    ins_topic: str  #: Topic of the INS that is judged.
+    gnss_topic: str  #: Topic of the GNSS; empty where none is compared.
+    kind: str  #: unaided, gnss_aided or unknown; GNSS holds the errors of an aided one.
+    ins_class: str  #: Class whose limits apply.
     start_s: float | None
-    alignment: InsAlignment
-    at_start: ErrorsAtStart | None
-    standing: StandingDrift | None
-    standing_reason: str
-    shutdown: InsShutdown
-    realignments: tuple[InsRealignment, ...] = ()
+    alignment: InsAlignment  #: Alignment before navigation; null where none is logged.
+    at_start: ErrorsAtStart | None  #: Tilt and azimuth at the start of navigation.
+    standing: StandingDrift | None  #: Velocity error while parked, and its drift.
+    standing_reason: str  #: Why there is no stretch; empty where there is one.
+    shutdown: InsShutdown  #: Errors at the end of the log; null where the aircraft does not stand there.
+    realignments: tuple[InsRealignment, ...] = ()  #: Alignments and position sets after the start.
     mode_flicker: int = 0
     figures: tuple[FigureData, ...] = ()

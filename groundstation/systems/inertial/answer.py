@@ -40,13 +40,13 @@ class StateEstimate:
 
     schema_name: ClassVar[str] = "state"
 
-    name: str = field(metadata={"one_of": STATES})
-    title: str
-    unit: str
-    value: float
-    sigma: float
-    observability: float
-    observable_from_s: float | None
+    name: str = field(metadata={"one_of": STATES})  #: Stable name for scripts.
+    title: str  #: Name for people.
+    unit: str  #: Unit of value and sigma.
+    value: float  #: Estimate at the last time GNSS was there.
+    sigma: float  #: Its standard deviation.
+    observability: float  #: 1 - sigma / sigma without GNSS: near 0 the data say nothing of it.
+    observable_from_s: float | None  #: Flight second from which observability stays above one half; null if never.
 
 
 @dataclass(frozen=True)
@@ -61,16 +61,16 @@ class ChannelResult(Brief):
 
     schema_name: ClassVar[str] = "channel"
 
-    name: str = field(metadata={"one_of": CHANNELS})
-    states: tuple[StateEstimate, ...]
-    nis: float
-    nis_low: float | None
-    nis_high: float | None
-    share_inside95: float
-    innovations: int
-    rejected: int
-    velocity_error_rms_mps: float | None
-    position_error_rms_m: float | None
+    name: str = field(metadata={"one_of": CHANNELS})  #: north or east.
+    states: tuple[StateEstimate, ...]  #: Final estimates of the error states, INS minus truth.
+    nis: float  #: Mean normalised innovation squared per measurement; 1 is honest.
+    nis_low: float | None  #: Lower 95 % limit of NIS; null where the noise was inflated for colour.
+    nis_high: float | None  #: Upper 95 % limit of NIS; null where the noise was inflated for colour.
+    share_inside95: float  #: Share of the innovations inside their own 95 % band.
+    innovations: int  #: Measurements that were compared.
+    rejected: int  #: Measurements that the gate refused.
+    velocity_error_rms_mps: float | None  #: RMS of the velocity error, INS minus GNSS.
+    position_error_rms_m: float | None  #: RMS of the position error, INS minus GNSS.
 
 
 @dataclass(frozen=True)
@@ -86,10 +86,11 @@ class RealOutage:
 
     start_s: float
     end_s: float
-    length_s: float
+    length_s: float  #: From the last comparison to the next.
+    #: Forecast error against what GNSS showed at its end, radial; null when the flight ended before.
     jump_m: float | None
-    sigma_m: float | None
-    missing: str = field(default="gnss", metadata={"one_of": tuple(MISSING)})
+    sigma_m: float | None  #: Radial sigma that the forecast claimed there.
+    missing: str = field(default="gnss", metadata={"one_of": tuple(MISSING)})  #: What was absent: gnss, ins or both.
 
 
 @dataclass(frozen=True)
@@ -100,14 +101,15 @@ class Difference:
     and ``largest`` are of the magnitude.
     """
 
-    quantity: str = field(metadata={"one_of": QUANTITIES})
+    quantity: str = field(metadata={"one_of": QUANTITIES})  #: position or velocity.
+    #: north, east, or horizontal: the length of both.
     axis: str = field(metadata={"one_of": (*CHANNELS, "horizontal")})
-    unit: str
-    samples: int
-    mean: float
-    median: float
-    p95: float
-    largest: float
+    unit: str  #: Unit of the figures.
+    samples: int  #: Epochs compared.
+    mean: float  #: Mean of INS minus GNSS, with its sign.
+    median: float  #: Median of the magnitude.
+    p95: float  #: 95th percentile of the magnitude.
+    largest: float  #: Largest magnitude.
 
 
 @dataclass(frozen=True)
@@ -120,16 +122,16 @@ class OwnInnovation:
     logs no ratio to it.
     """
 
-    quantity: str = field(metadata={"one_of": QUANTITIES})
-    axis: str = field(metadata={"one_of": CHANNELS})
+    quantity: str = field(metadata={"one_of": QUANTITIES})  #: position or velocity.
+    axis: str = field(metadata={"one_of": CHANNELS})  #: north or east.
     unit: str
-    samples: int
-    mean: float
-    median: float
-    p95: float
-    sigma: float | None
-    share_inside95: float | None
-    share_rejected: float | None
+    samples: int  #: Innovations logged.
+    mean: float  #: Mean of measured minus predicted, with its sign.
+    median: float  #: Median of the magnitude.
+    p95: float  #: 95th percentile of the magnitude.
+    sigma: float | None  #: Root of the filter's median variance; null where it logs none.
+    share_inside95: float | None  #: Share inside the filter's own 95 % band; null without a variance.
+    share_rejected: float | None  #: Share beyond the filter's own gate; null where it logs no ratio.
 
 
 @dataclass(frozen=True)
@@ -149,8 +151,8 @@ class Departure:
 
     start_s: float
     end_s: float
-    largest_m: float | None
-    largest_mps: float | None
+    largest_m: float | None  #: Largest horizontal distance of INS and GNSS in it; null where it is not known.
+    largest_mps: float | None  #: Largest difference of their velocities; null where it is not known.
     share_rejected: float | None = None
     at_start: bool = False
 
@@ -172,9 +174,9 @@ class FilterOfIns:
     ``flew`` is None where the log does not tell; ``source`` is the parameter or field that does.
     """
 
-    name: str = ""
-    flew: bool | None = None
-    source: str = ""
+    name: str = ""  #: Filter as the autopilot names it.
+    flew: bool | None = None  #: Whether it flew the aircraft; null where the log does not tell.
+    source: str = ""  #: Parameter or field that tells it.
 
     @property
     def title(self) -> str:
@@ -198,9 +200,10 @@ class NavigationStart:
     ``unknown``; ``reason`` says it for people.
     """
 
-    time_s: float | None
+    time_s: float | None  #: Flight second, negative before the log; null where nothing proves it.
+    #: stated, mode (a change from alignment is logged), standstill (the log begins parked) or unknown.
     basis: str = field(metadata={"one_of": STARTS})
-    reason: str
+    reason: str  #: The same for people.
 
 
 @dataclass(frozen=True)
@@ -260,35 +263,37 @@ class InertialResult(Answer, KindOfIns, AzimuthByTurns, BestTrack, ErrorsAlongTh
     analysis: ClassVar[str] = "inertial"
     schema_name: ClassVar[str] = analysis
 
-    ins_topic: str
-    gnss_topic: str
+    ins_topic: str  #: Topic of the INS judged.
+    gnss_topic: str  #: Topic of the GNSS that it is compared with.
     kind: str = field(metadata={"one_of": ("unaided", "gnss_aided", "unknown")})
-    kind_reason: str
-    epochs: int
-    gnss_seconds: float
+    kind_reason: str  #: What shows the kind, for people.
+    epochs: int  #: Epochs compared.
+    gnss_seconds: float  #: Seconds of the flight with GNSS.
     ins_class: str = ""
-    ins_class_origin: str = ""
+    ins_class_origin: str = ""  #: Where the class comes from, in words.
     transition: str = field(default="exact", metadata={"one_of": ("exact", "first_order")})
-    north: ChannelResult | None = None
-    east: ChannelResult | None = None
+    north: ChannelResult | None = None  #: Errors of the north channel; null where GNSS corrects the INS.
+    east: ChannelResult | None = None  #: Errors of the east channel; null where GNSS corrects the INS.
+    #: Median of radial position error over time since navigation began; null where the start is not known.
     radial_error_rate_50_nmiph: float | None = None
-    radial_error_rate_95_nmiph: float | None = None
+    radial_error_rate_95_nmiph: float | None = None  #: 95th percentile of the same rate.
     radial_error_rate_fit_nmiph: float | None = None
-    velocity_error_rms_mps: float | None = None
-    largest_radial_error_m: float | None = None
-    largest_radial_error_at_s: float | None = None
-    largest_radial_error_utc: str = ""
+    velocity_error_rms_mps: float | None = None  #: RMS of the horizontal velocity error, both channels together.
+    largest_radial_error_m: float | None = None  #: Largest radial position error, INS minus GNSS.
+    largest_radial_error_at_s: float | None = None  #: Flight second of that error.
+    largest_radial_error_utc: str = ""  #: UTC of that error, ISO 8601; empty without.
     navigation_start: NavigationStart | None = None
-    radial_error_first_m: float | None = None
-    radial_error_last_m: float | None = None
-    compared_hours: float | None = None
+    radial_error_first_m: float | None = None  #: Radial position error at the first epoch with GNSS.
+    radial_error_last_m: float | None = None  #: Radial position error at the last epoch with GNSS.
+    compared_hours: float | None = None  #: Hours between the first and the last epoch compared.
     differences: tuple[Difference, ...] = ()
     own_filter: str = ""
-    own_innovations: tuple[OwnInnovation, ...] = ()
+    own_innovations: tuple[OwnInnovation, ...] = ()  #: What the filter of an aided INS logs of its innovations.
     departures: tuple[Departure, ...] = ()
+    #: Which filter of the autopilot the INS is, and whether it flew; null where it is none.
     filter_of_ins: FilterOfIns = field(default_factory=FilterOfIns)
     outages: tuple[RealOutage, ...] = ()
-    azimuth: AzimuthEstimate | None = None
+    azimuth: AzimuthEstimate | None = None  #: Heading error by turns in flight; null where there is no estimate.
     reopened: int = 0
     other_ins: tuple[str, ...] = ()
     settings: dict[str, float | str | bool] = field(default_factory=dict)

@@ -43,9 +43,9 @@ class Within95:
 
     schema_name: ClassVar[str] = "within95"
 
-    value: float
-    low95: float
-    high95: float
+    value: float  #: Best estimate.
+    low95: float  #: Lower end of its 95 % interval.
+    high95: float  #: Upper end of its 95 % interval.
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ class CauseShare:
 
     schema_name: ClassVar[str] = "cause_share"
 
-    name: Cause = field(metadata={"one_of": CAUSES})
-    share: Within95
+    name: Cause = field(metadata={"one_of": CAUSES})  #: Cause for scripts.
+    share: Within95  #: Share of the mean square velocity error; all add up to 1, one may be negative.
 
 
 @dataclass(frozen=True)
@@ -80,12 +80,12 @@ class CauseParameter:
     schema_name: ClassVar[str] = "cause_parameter"
 
     name: ParameterName = field(metadata={"one_of": PARAMETERS})
-    title: str
-    unit: str
-    value: float
-    half95: float
+    title: str  #: Name for people.
+    unit: str  #: Unit of value and interval.
+    value: float  #: Estimate over the whole flight.
+    half95: float  #: Half of its 95 % interval.
     observability: float
-    is_observable: bool
+    is_observable: bool  #: Whether the flight tells more than half of what there is to know.
 
 
 @dataclass(frozen=True)
@@ -113,11 +113,11 @@ class SchulerWave:
 
     schema_name: ClassVar[str] = "schuler_wave"
 
-    channel: str = field(metadata={"one_of": ("north", "east")})
+    channel: str = field(metadata={"one_of": ("north", "east")})  #: north or east.
     amplitude_mps: Within95
     phase_deg: Within95 | None
-    tilt_arcsec: Within95
-    bias_ug: Within95
+    tilt_arcsec: Within95  #: Initial tilt that alone would make the amplitude.
+    bias_ug: Within95  #: Accelerometer bias that alone would make the amplitude.
     offset_mps: Within95
     end_mps: Within95
     flight_mps: Within95 | None = None
@@ -135,12 +135,13 @@ class StraightLeg:
 
     start_s: float
     end_s: float
-    course_deg: float
-    length_km: float
-    along_rate_nmiph: Measured | None
-    across_rate_nmiph: Measured | None
+    course_deg: float  #: True course.
+    length_km: float  #: Length over ground.
+    along_rate_nmiph: Measured | None  #: Growth of the position error along the course.
+    across_rate_nmiph: Measured | None  #: Growth of the position error across the course, right positive.
+    #: Change of the velocity error along the course, from the first to the last half minute.
     along_change_mps: Measured | None
-    across_change_mps: Measured | None
+    across_change_mps: Measured | None  #: Change of the velocity error across the course, right positive.
 
 
 @dataclass(frozen=True)
@@ -154,12 +155,12 @@ class ErrorWindow:
 
     schema_name: ClassVar[str] = "error_window"
 
-    hours: float
-    since_start_m: float | None
-    median_m: float | None
-    p95_m: float | None
-    windows: int
-    independent: int
+    hours: float  #: Length of the window.
+    since_start_m: float | None  #: Radial error so long after navigation began.
+    median_m: float | None  #: Median of what builds up in windows of this length.
+    p95_m: float | None  #: 95th percentile of what builds up.
+    windows: int  #: Windows, one every five minutes: they overlap.
+    independent: int  #: Windows that fit in one after the other.
 
 
 @dataclass(frozen=True)
@@ -168,10 +169,10 @@ class AlongAcross:
 
     schema_name: ClassVar[str] = "along_across"
 
-    quantity: str = field(metadata={"one_of": ("position", "velocity")})
+    quantity: str = field(metadata={"one_of": ("position", "velocity")})  #: position or velocity.
     unit: str
-    along: float
-    across: float
+    along: float  #: RMS along the track.
+    across: float  #: RMS across the track.
 
 
 @dataclass(frozen=True)
@@ -209,25 +210,25 @@ class CausesResult(Answer):
     analysis: ClassVar[str] = "ins_causes"
     schema_name: ClassVar[str] = analysis
 
-    ins_topic: str
+    ins_topic: str  #: Topic of the INS judged.
     gnss_topic: str
-    ins_class: str
+    ins_class: str  #: Class of the INS: noise and limits.
     sentence: str
     hours: float
-    schuler_period_min: float
+    schuler_period_min: float  #: Period of the Schuler oscillation, about 84.4 min.
     heading_spread: float
     is_parted: bool
     is_strapdown: bool
     resets: int
     start_mps: Within95
-    start_tilt_arcsec: Within95
-    shares: tuple[CauseShare, ...]
-    parameters: tuple[CauseParameter, ...]
-    schuler: tuple[SchulerWave, ...]
-    legs: tuple[StraightLeg, ...]
+    start_tilt_arcsec: Within95  #: Initial tilt that alone would make the Schuler amplitude.
+    shares: tuple[CauseShare, ...]  #: Share of the velocity error that each cause explains.
+    parameters: tuple[CauseParameter, ...]  #: Constants of the INS that the flight shows.
+    schuler: tuple[SchulerWave, ...]  #: Schuler oscillation of each channel.
+    legs: tuple[StraightLeg, ...]  #: Straight legs, errors along and across the course.
     legs_left_out: int
-    windows: tuple[ErrorWindow, ...]
-    along_across: tuple[AlongAcross, ...]
+    windows: tuple[ErrorWindow, ...]  #: Radial error after so many hours.
+    along_across: tuple[AlongAcross, ...]  #: RMS errors along and across the track.
     period_share: float | None = None
     figures: tuple[FigureData, ...] = ()
 

@@ -2,19 +2,25 @@
 
 import numpy as np
 
+from groundstation.chapters.fleet.common import aircraft_name
 from groundstation.chapters.plots.common import label, line_with_dots
-from groundstation.chapters.plots.fleet.common import Places, date_axis, roles_of, seconds_of
-from groundstation.plots.marks import AnyMark, Curve, Dots, Emphasis, Limit, Role, series
+from groundstation.chapters.plots.fleet.common import Places, date_axis, left_out, roles_of, rows_shown, seconds_of
+from groundstation.plots.marks import SERIES, AnyMark, Curve, Dots, Emphasis, Limit, Role, series
 from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
-from groundstation.results.fleet import FleetResults
-from groundstation.systems.inertial.fleet_chapter import HEADLINE_MIN, drawn, method_title, shipped_method
+from groundstation.results.fleet import WHOLE_FLEET, FleetResults
+from groundstation.systems.inertial.fleet_chapter import HEADLINE_MIN, drawn, method_title, parted, shipped_method
 from groundstation.systems.inertial.forecast_plots import HORIZON, OTHERS
 
 CONFIDENCE = 95.0
 
 
 def growth(fleet: FleetResults) -> Plot:
-    """Return the error of each method against the horizon."""
+    """Return the error against the horizon: of each method, or of each aircraft.
+
+    Several aircraft have a line each, of the shipped method.
+    """
+    if parted(fleet):
+        return _growth_by_aircraft(fleet)
     rows, shipped = drawn(fleet), shipped_method(fleet)
     methods = list(dict.fromkeys(row.method for row in rows))
     others = (name for name in methods if name not in ("raw_ins", shipped))
@@ -29,25 +35,61 @@ def growth(fleet: FleetResults) -> Plot:
         heavy: Emphasis = "bold" if name == shipped else "usual"
         text = label(f"{method_title(name)}{' (shipped)' if name == shipped else ''}")
         marks.append(Curve(x=x, y=y, role=roles.get(name, "faint"), name=text, emphasis=heavy))
-    panel = Panel(marks, Axis(HORIZON, "log"), Axis("RMS radial error, m", "log"), legend="beside")
     return Plot(
         "fleet.growth",
         "How the error grows",
         "Root mean square over all starts of all flights, by method; grey: the shipped method on each flight.",
         "RMS forecast error against horizon for each method, with the single flights, logarithmic axes.",
-        one_panel(panel, 70.0),
+        _growing(marks),
     )
+
+
+def _growth_by_aircraft(fleet: FleetResults) -> Plot:
+    """Return the error of the shipped method against the horizon, a line for each aircraft."""
+    rows, table, roles = drawn(fleet), fleet.skill_flights, roles_of(fleet)
+    owner = {str(name): str(one) for name, one in zip(table.flight_id, table.aircraft, strict=True)}
+    shown = rows_shown({name: list(owner.values()).count(name) for name in parted(fleet)}, len(SERIES))
+    own_roles = roles if len(set(roles.values())) > 2 else {name: series(at) for at, name in enumerate(shown)}
+    marks: list[AnyMark] = []
+    known = (table.rms_m > 0.0) & (table.horizon_min > 0.0)
+    for name in shown:
+        own = known & (table.aircraft == name)
+        marks.append(Dots(x=table.horizon_min[own], y=table.rms_m[own], role=own_roles[name]))
+    if (nameless := known & (table.aircraft == "")).any():
+        marks.append(Dots(x=table.horizon_min[nameless], y=table.rms_m[nameless], role="unused", name="not named"))
+    for name in shown:
+        shipped = shipped_method(fleet, name)
+        line = sorted(
+            (row.horizon_min, row.rms_m)
+            for row in rows
+            if (row.aircraft, row.method) == (name, shipped) and row.horizon_min > 0.0
+        )
+        x, y = np.array(line, dtype=np.float64).reshape(-1, 2).T
+        marks.append(Curve(x=x, y=y, role=own_roles[name], name=label(aircraft_name(name), 12), emphasis="bold"))
+    return Plot(
+        "fleet.growth",
+        "How the error grows",
+        "Line: root mean square over all starts of an aircraft, by its shipped method; dots: each of its flights."
+        f"{left_out(len(shown), len(parted(fleet)))}",
+        "RMS forecast error against horizon for each aircraft, with its single flights, logarithmic axes.",
+        _growing(marks),
+    )
+
+
+def _growing(marks: list[AnyMark]) -> tuple[Row, ...]:
+    return one_panel(Panel(marks, Axis(HORIZON, "log"), Axis("RMS radial error, m", "log"), legend="beside"), 70.0)
 
 
 def flights(fleet: FleetResults) -> Plot:
     """Return the shipped method on every flight, and how honest its band is."""
     horizons = np.unique(fleet.skill_flights.horizon_min)
     horizon = HEADLINE_MIN if HEADLINE_MIN in horizons else float(horizons[-1])
+    by_colour = ", a line for each aircraft in the colour of its flights" if parted(fleet) else ""
     return Plot(
         "fleet.skill",
         "Flights and coverage",
         f"Left: the shipped method on every flight after {horizon:g} min without GNSS. Right: share of the errors of "
-        "all starts inside the band that the forecast claims; below the dashed line it is overconfident.",
+        f"all starts inside the band that the forecast claims{by_colour}; below the dashed line it is overconfident.",
         "Forecast error of every flight over time, and coverage of the forecast's band by horizon.",
         (Row((_flights(fleet, horizon), _coverage(fleet)), 42.0),),
     )
@@ -87,16 +129,23 @@ def _flights(fleet: FleetResults, horizon: float) -> Panel:
 
 
 def _coverage(fleet: FleetResults) -> Panel:
-    shipped = shipped_method(fleet)
-    covered = sorted(
-        (row.horizon_min, 100.0 * row.coverage95)
-        for row in fleet.skill
-        if row.method == shipped and row.coverage95 is not None and np.isfinite(row.horizon_min)
-    )
-    marks: tuple[AnyMark, ...] = ()
-    if covered:
-        x, y = np.array(covered, dtype=np.float64).T
-        marks = (Limit(value=CONFIDENCE, role="answer", name="wanted"), *line_with_dots(x, y, "answer"))
+    """Describe the share of errors inside the band by horizon, a line for each aircraft."""
+    names, roles, rows = parted(fleet), roles_of(fleet), drawn(fleet)
+    marks: list[AnyMark] = []
+    for name in names or (WHOLE_FLEET,):
+        shipped = shipped_method(fleet, name)
+        covered = sorted(
+            (row.horizon_min, 100.0 * row.coverage95)
+            for row in rows
+            if (row.aircraft, row.method) == (name, shipped)
+            and row.coverage95 is not None
+            and np.isfinite(row.horizon_min)
+        )
+        if covered:
+            x, y = np.array(covered, dtype=np.float64).T
+            marks += line_with_dots(x, y, roles[name] if names else "answer")
+    if marks:
+        marks.insert(0, Limit(value=CONFIDENCE, role="answer", name="wanted"))
     upright = Axis("inside the 95 % band, %", low=0.0, high=105.0)
-    nothing = "" if covered else "no band claimed"
+    nothing = "" if marks else "no band claimed"
     return Panel(marks, Axis("horizon, min"), upright, legend="", nothing=nothing)

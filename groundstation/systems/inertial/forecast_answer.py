@@ -32,14 +32,15 @@ class SkillRow:
 
     schema_name: ClassVar[str] = "skill"
 
+    #: How the error is forecast; default_method is the shipped one.
     method: str = field(metadata={"one_of": tuple(FORECAST_METHODS)})
-    horizon_min: float
-    starts: int
-    rms_m: float
-    median_m: float
-    p95_m: float
-    coverage95: float | None
-    coverage95_model: float | None = None
+    horizon_min: float  #: Minutes since GNSS was lost.
+    starts: int  #: Outages replayed.
+    rms_m: float  #: RMS of the radial error built up since the start of the outage.
+    median_m: float  #: Median of the same.
+    p95_m: float  #: 95th percentile of the same.
+    coverage95: float | None  #: Share of the channel errors inside the forecast's own 95 % band; null without a band.
+    coverage95_model: float | None = None  #: The same before the sigma is scaled by class and past of the flight.
 
 
 @dataclass(frozen=True)
@@ -51,11 +52,12 @@ class GapRow:
 
     schema_name: ClassVar[str] = "gap"
 
+    #: forward filter, or rts: smoothed with GNSS on both sides.
     method: str = field(metadata={"one_of": ("forward", "rts")})
-    length_min: float
-    starts: int
-    max_error_rms_m: float
-    coverage95: float | None
+    length_min: float  #: Length of the gap.
+    starts: int  #: Gaps replayed.
+    max_error_rms_m: float  #: RMS over the gaps of the largest radial error in each.
+    coverage95: float | None  #: Share of the errors inside the 95 % band.
 
 
 @dataclass(frozen=True)
@@ -68,12 +70,12 @@ class PhaseRow:
 
     schema_name: ClassVar[str] = "phase_outage"
 
-    phase: str
-    length_s: float
-    starts: int
-    rms_m: float
-    raw_rms_m: float
-    is_early: bool | None = None
+    phase: str  #: Phase of flight in which they begin.
+    length_s: float  #: Length of the outage.
+    starts: int  #: Outages replayed.
+    rms_m: float  #: RMS radial error of the default method.
+    raw_rms_m: float  #: RMS radial error of the raw INS.
+    is_early: bool | None = None  #: Begin before ``first_start_s``; null in results of older versions.
 
 
 @dataclass(frozen=True)
@@ -83,11 +85,11 @@ class ClassicStart:
     It has the radial and the east error at the end and at equal horizons.
     """
 
-    start_h: float
-    method: str = field(metadata={"one_of": tuple(FORECAST_METHODS)})
-    horizon_min: float
-    error_m: float
-    east_error_m: float
+    start_h: float  #: Hours from the beginning to the loss of GNSS.
+    method: str = field(metadata={"one_of": tuple(FORECAST_METHODS)})  #: How the error is forecast.
+    horizon_min: float  #: Minutes since GNSS was lost.
+    error_m: float  #: Radial error.
+    east_error_m: float  #: East error, forecast minus truth.
 
 
 @dataclass(frozen=True)
@@ -101,17 +103,17 @@ class CalibrationRow:
 
     schema_name: ClassVar[str] = "calibration"
 
-    method: str = field(metadata={"one_of": tuple(FORECAST_METHODS)})
-    horizon_min: float
-    starts: int
-    independent_starts: int
-    inside50: float
-    inside68: float
-    inside95: float
-    nees: float
-    nees_low: float
-    nees_high: float
-    scale: float
+    method: str = field(metadata={"one_of": tuple(FORECAST_METHODS)})  #: How the error is forecast.
+    horizon_min: float  #: Minutes since GNSS was lost.
+    starts: int  #: Outages replayed: they overlap.
+    independent_starts: int  #: Outages that fit in one after the other.
+    inside50: float  #: Share of errors inside the 50 % band.
+    inside68: float  #: Share of errors inside the 68 % band.
+    inside95: float  #: Share of errors inside the 95 % band.
+    nees: float  #: Mean normalised squared position error; 1 is honest.
+    nees_low: float  #: Lower 95 % limit of NEES by independent starts.
+    nees_high: float  #: Upper 95 % limit of NEES by independent starts.
+    scale: float  #: Factor on the model's sigma, mean over the starts.
 
 
 @dataclass(frozen=True)
@@ -124,9 +126,9 @@ class CoupledRow:
 
     schema_name: ClassVar[str] = "coupled"
 
-    horizon_min: float
-    rms_m: float
-    gain: float
+    horizon_min: float  #: Minutes since GNSS was lost.
+    rms_m: float  #: RMS radial error of the coupled model.
+    gain: float  #: 1 minus its RMS over that of two separate channels.
 
 
 @dataclass(frozen=True)
@@ -154,16 +156,16 @@ class ForecastResult(Answer, ForecastOfErrors):
     schema_name: ClassVar[str] = analysis
 
     default_method: str = field(metadata={"one_of": tuple(FORECAST_METHODS)})
-    first_start_s: float
-    start_step_s: float
+    first_start_s: float  #: Flight second of the first start of `skill`.
+    start_step_s: float  #: Seconds between two starts of `skill`.
     is_calibrated: bool
-    calibration_reason: str
-    skill: tuple[SkillRow, ...]
-    gaps: tuple[GapRow, ...] = ()
-    phases: tuple[PhaseRow, ...] = ()
-    classic_starts: tuple[ClassicStart, ...] = ()
-    calibration: tuple[CalibrationRow, ...] = ()
-    coupled: tuple[CoupledRow, ...] = ()
+    calibration_reason: str  #: Why it is not calibrated; empty where it is.
+    skill: tuple[SkillRow, ...]  #: Error that builds up without GNSS, by method and horizon.
+    gaps: tuple[GapRow, ...] = ()  #: Error within replayed gaps that have GNSS on both sides.
+    phases: tuple[PhaseRow, ...] = ()  #: Error of outages that begin in one phase of flight.
+    classic_starts: tuple[ClassicStart, ...] = ()  #: The paper's four starts, of a flight long enough.
+    calibration: tuple[CalibrationRow, ...] = ()  #: Whether the forecast's sigma is honest, by horizon.
+    coupled: tuple[CoupledRow, ...] = ()  #: What the coupled model gains over two channels.
     best_method: dict[str, str] = field(default_factory=dict, metadata={"one_of": tuple(FORECAST_METHODS)})
     figures: tuple[FigureData, ...] = ()
 

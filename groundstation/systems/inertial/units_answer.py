@@ -24,8 +24,8 @@ class Measured:
 
     schema_name: ClassVar[str] = "measured"
 
-    value: float
-    half95: float
+    value: float  #: Best estimate.
+    half95: float  #: Half of the 95 % interval of the measurement.
 
 
 @dataclass(frozen=True)
@@ -52,15 +52,16 @@ class InsFault:
 
     schema_name: ClassVar[str] = "ins_fault"
 
+    #: drift, tilt, step, swapped_axis, stuck, frozen or heading.
     kind: FaultKind = field(metadata={"one_of": FAULT_KINDS})
     topics: tuple[str, ...]
     by: str
     text: str
-    start_s: float | None = None
-    end_s: float | None = None
-    value: float | None = None
-    half95: float | None = None
-    unit: str = ""
+    start_s: float | None = None  #: Flight second at which it begins; null of a fault without a place.
+    end_s: float | None = None  #: Flight second at which it ends; null of a fault without a place.
+    value: float | None = None  #: Size of the fault in `unit`; null where the kind has none.
+    half95: float | None = None  #: Half of its 95 % interval, where it has one.
+    unit: str = ""  #: nmi/h of a drift, m/s of a tilt (Schuler amplitude), m or m/s of a step, deg of a heading.
     limit: float | None = None
 
 
@@ -103,21 +104,22 @@ class InsUnit:
 
     schema_name: ClassVar[str] = "ins_unit"
 
-    topic: str
-    kind: str
-    kind_reason: str
-    has_position: bool
+    topic: str  #: Topic of the INS.
+    kind: str  #: unaided, gnss_aided or unknown.
+    kind_reason: str  #: What shows the kind, for people.
+    has_position: bool  #: Whether it logs a position.
     state: UnitState = field(metadata={"one_of": UNIT_STATES})
     serials: tuple[str, ...] = ()
     start_s: float | None = None
     compared_hours: float | None = None
     rate_fit_nmiph: Measured | None = None
+    #: Median of radial error over time, later than ten minutes; null where the start is not known.
     rate_50_nmiph: float | None = None
-    rate_95_nmiph: float | None = None
-    velocity_rms_mps: Measured | None = None
-    schuler_mps: Measured | None = None
-    largest_m: Measured | None = None
-    largest_at_s: float | None = None
+    rate_95_nmiph: float | None = None  #: 95th percentile of the same.
+    velocity_rms_mps: Measured | None = None  #: RMS of the horizontal velocity error.
+    schuler_mps: Measured | None = None  #: Amplitude of the velocity error with the Schuler period.
+    largest_m: Measured | None = None  #: Largest radial position error.
+    largest_at_s: float | None = None  #: Flight second of that error.
     heading_difference_deg: float | None = None
     lag_s: Measured | None = None
     same_as: str = ""
@@ -135,20 +137,20 @@ class InsPair:
 
     schema_name: ClassVar[str] = "ins_pair"
 
-    first: str
-    second: str
-    hours: float
-    rate_fit_nmiph: Measured | None
-    velocity_rms_mps: Measured | None
-    schuler_mps: Measured | None
-    largest_m: Measured | None
-    heading_difference_deg: Measured | None
-    is_start_known: bool = False
-    rate_limit_nmiph: float | None = None
-    velocity_limit_mps: float | None = None
-    heading_limit_deg: float | None = None
-    is_beyond: bool = False
-    why_not: str = ""
+    first: str  #: Topic of one unit.
+    second: str  #: Topic of the other.
+    hours: float  #: Time compared.
+    rate_fit_nmiph: Measured | None  #: Growth of the distance between them, slope through the origin.
+    velocity_rms_mps: Measured | None  #: RMS of the difference of their velocities.
+    schuler_mps: Measured | None  #: Amplitude of that difference with the Schuler period.
+    largest_m: Measured | None  #: Largest distance between them.
+    heading_difference_deg: Measured | None  #: Median of second minus first heading.
+    is_start_known: bool = False  #: Whether the start of navigation of both is known: else no rate is judged.
+    rate_limit_nmiph: float | None = None  #: Limit of the growth for two honest units.
+    velocity_limit_mps: float | None = None  #: Limit of the velocity difference.
+    heading_limit_deg: float | None = None  #: Limit of the heading difference.
+    is_beyond: bool = False  #: Whether a limit is exceeded.
+    why_not: str = ""  #: Why the pair is not judged; empty where it is.
 
 
 @dataclass(frozen=True)
@@ -174,15 +176,15 @@ class UnitsResult(Answer):
     schema_name: ClassVar[str] = analysis
 
     verdict: Verdict = field(metadata={"one_of": VERDICTS})
-    sentence: str
-    off: tuple[str, ...]
-    units: tuple[InsUnit, ...]
-    pairs: tuple[InsPair, ...]
-    faults: tuple[InsFault, ...]
+    sentence: str  #: Conclusion for people.
+    off: tuple[str, ...]  #: Topics of the units that are off, or of which one is.
+    units: tuple[InsUnit, ...]  #: Every INS against the reference.
+    pairs: tuple[InsPair, ...]  #: Every two INS against each other.
+    faults: tuple[InsFault, ...]  #: When and how a unit went wrong.
     against: str
-    against_title: str
-    ins_class: str
-    ins_class_origin: str
+    against_title: str  #: The reference in words.
+    ins_class: str  #: Class whose limits apply.
+    ins_class_origin: str  #: Where the class comes from, in words.
     false_alarm_share: float
     is_common: bool = False
     figures: tuple[FigureData, ...] = ()

@@ -29,14 +29,14 @@ class Established:
 
     start_s: float
     end_s: float
-    length_m: float
-    start_height_m: float | None
-    end_height_m: float | None
-    line_course_deg: float
-    lateral_rms_dots: float
-    vertical_rms_dots: float | None
-    lateral_rms_m: float
-    vertical_rms_m: float | None
+    length_m: float  #: Distance flown in it.
+    start_height_m: float | None  #: Height above the threshold where it begins.
+    end_height_m: float | None  #: Height above the threshold where it ends.
+    line_course_deg: float  #: True course of the line through its positions.
+    lateral_rms_dots: float  #: RMS deviation from the course.
+    vertical_rms_dots: float | None  #: RMS deviation from the glide path.
+    lateral_rms_m: float  #: RMS distance from the course.
+    vertical_rms_m: float | None  #: RMS distance from the glide path.
 
 
 StabilisedVerdict = Literal["stabilised", "not stabilised", "not measured"]
@@ -50,9 +50,9 @@ class GatePlace:
     ``side``: of the course or the path, where the value counts from either; the bank's likewise.
     """
 
-    name: str
-    at: Place
-    side: Side = ""
+    name: str  #: Name of the criterion.
+    at: Place  #: Instant of the value.
+    side: Side = ""  #: Side of the course or the path; empty where there is none.
 
 
 @dataclass(frozen=True)
@@ -62,11 +62,11 @@ class StabilityLost:
     ``is_from_the_start``: it was not kept at the check height itself. ``side``: as in :class:`GatePlace`.
     """
 
-    height_m: float
-    time_s: float
-    criterion: str
-    is_from_the_start: bool
-    side: Side = ""
+    height_m: float  #: Height above the threshold.
+    time_s: float  #: Flight second of the loss.
+    criterion: str  #: Name of the criterion.
+    is_from_the_start: bool  #: It was not kept at the check height itself.
+    side: Side = ""  #: Side of the course or the path; empty where there is none.
 
 
 @dataclass(frozen=True)
@@ -78,22 +78,22 @@ class StabilisedAt(Brief):
     were found, ``lost`` where a limit was first left, ``stable_m`` the height from which all were kept for good.
     """
 
-    height_m: float
-    verdict: StabilisedVerdict
-    time_s: float | None
-    gates: tuple[Gate, ...]
-    reason: str = ""
-    places: tuple[GatePlace, ...] = ()
-    lost: StabilityLost | None = None
-    stable_m: float | None = None
+    height_m: float  #: Check height above the threshold.
+    verdict: StabilisedVerdict  #: stabilised if a criterion was met and none failed.
+    time_s: float | None  #: Flight second at which the height was passed.
+    gates: tuple[Gate, ...]  #: Criteria with figure and limit.
+    reason: str = ""  #: Why none was measured; empty where one was.
+    places: tuple[GatePlace, ...] = ()  #: Where each value was found.
+    lost: StabilityLost | None = None  #: First limit that was left below; null where none was.
+    stable_m: float | None = None  #: Height from which all limits were kept for good.
 
 
 @dataclass(frozen=True)
 class ErrorPart:
     """Contribution of a part of the error budget to sigma at the threshold."""
 
-    name: str
-    sigma_m: float
+    name: str  #: Where it comes from.
+    sigma_m: float  #: Its standard deviation at the threshold.
 
 
 @dataclass(frozen=True)
@@ -125,20 +125,21 @@ class PositionError:
 
     topic: str
     state: Measured
-    reason: str
-    samples: int
+    reason: str  #: Why it is not measured; empty where it is.
+    samples: int  #: Positions compared on the final.
+    #: Recorded position minus the localizer's, right of the course positive, at the threshold.
     error_m: float | None = None
-    sigma_m: float | None = None
+    sigma_m: float | None = None  #: Standard deviation of the error.
     confidence95_m: tuple[float, float] | None = None
-    rate_mps: float | None = None
-    rate_sigma_mps: float | None = None
-    rollout_error_m: float | None = None
-    rollout_sigma_m: float | None = None
-    change_m: float | None = None
-    change_sigma_m: float | None = None
+    rate_mps: float | None = None  #: Growth of the error across the course.
+    rate_sigma_mps: float | None = None  #: Standard deviation of the growth.
+    rollout_error_m: float | None = None  #: The same error by the roll-out on the centre line.
+    rollout_sigma_m: float | None = None  #: Standard deviation of the error by the roll-out.
+    change_m: float | None = None  #: Error of the roll-out minus that of the final.
+    change_sigma_m: float | None = None  #: Standard deviation of the change.
     drift_nmi_per_h: float | None = None
     residual_ratio: float | None = None
-    parts: tuple[ErrorPart, ...] = ()
+    parts: tuple[ErrorPart, ...] = ()  #: What the sigma is made of.
 
 
 @dataclass(frozen=True)
@@ -163,14 +164,14 @@ class AlongError:
 
     topic: str
     state: Measured
-    reason: str
-    samples: int
-    error_m: float | None = None
-    sigma_m: float | None = None
+    reason: str  #: Why it is not measured; empty where it is.
+    samples: int  #: Positions compared on the final.
+    error_m: float | None = None  #: Recorded position minus the glide path's, forward positive, at the threshold.
+    sigma_m: float | None = None  #: Standard deviation of the error.
     confidence95_m: tuple[float, float] | None = None
     error_from_end_m: float | None = None
     scale: float | None = None
-    parts: tuple[ErrorPart, ...] = ()
+    parts: tuple[ErrorPart, ...] = ()  #: What the sigma is made of.
 
 
 @dataclass(frozen=True)
@@ -196,12 +197,12 @@ class HeightError:
 
     topic: str
     state: Measured
-    reason: str
-    samples: int
-    error_m: float | None = None
-    sigma_m: float | None = None
+    reason: str  #: Why it is not measured; empty where it is.
+    samples: int  #: Altitudes compared on the roll-out.
+    error_m: float | None = None  #: Recorded altitude minus elevation and height above the wheels, upwards positive.
+    sigma_m: float | None = None  #: Standard deviation of the error.
     confidence95_m: tuple[float, float] | None = None
-    parts: tuple[ErrorPart, ...] = ()
+    parts: tuple[ErrorPart, ...] = ()  #: What the sigma is made of.
 
 
 @dataclass(frozen=True)
@@ -212,8 +213,9 @@ class Sensitivity:
     off the course for it.
     """
 
+    #: Positions across the course over what the deviations show; 1 fits, null where never far enough off.
     ratio: float | None
-    sigma: float | None
+    sigma: float | None  #: Standard deviation of the ratio.
     samples: int
 
 
@@ -235,11 +237,11 @@ class Protection:
         Operations whose alarm limits all protection levels stay within.
     """
 
-    epochs: int
-    horizontal_max_m: float | None
-    vertical_max_m: float | None
-    horizontal_alarm_limit_m: float | None
-    vertical_alarm_limit_m: float | None
+    epochs: int  #: Epochs with a protection level.
+    horizontal_max_m: float | None  #: Greatest horizontal protection level of the final.
+    vertical_max_m: float | None  #: Greatest vertical protection level of the final.
+    horizontal_alarm_limit_m: float | None  #: Smallest horizontal alarm limit logged.
+    vertical_alarm_limit_m: float | None  #: Smallest vertical alarm limit logged.
     within_share: float | None
     operations: tuple[str, ...]
 
@@ -251,38 +253,40 @@ class Approach(Brief):
     Times are flight seconds; distances are before the threshold, behind it negative.
     """
 
-    number: int
-    outcome: Outcome
-    start_s: float
-    end_s: float
-    final_length_m: float
-    lowest_height_m: float | None
-    position_topic: str
-    guidance_topic: str
-    guidance_source: str
-    height_source: str
-    runway: RunwayUsed
-    established: Established | None
-    sensitivity: Sensitivity | None
-    touchdown: Touchdown | None
-    stabilised: tuple[StabilisedAt, ...]
-    position_errors: tuple[PositionError, ...]
-    protection: Protection | None
-    claim: str
+    number: int  #: From 1, in order of time.
+    outcome: Outcome  #: landing, touch-and-go or go-around.
+    start_s: float  #: Flight second at which the final begins.
+    end_s: float  #: Flight second at which the final ends.
+    final_length_m: float  #: Distance before the threshold at which the final begins.
+    lowest_height_m: float | None  #: Lowest height above the threshold.
+    position_topic: str  #: Topic of the positions that path and places are of.
+    guidance_topic: str  #: Topic of the deviations; empty where none are logged.
+    guidance_source: str  #: What the deviations are measured by.
+    height_source: str  #: Topic and field of the height.
+    runway: RunwayUsed  #: Runway it is measured against.
+    established: Established | None  #: Part flown on the guidance; null where there is none.
+    sensitivity: Sensitivity | None  #: Whether sense and width of the logged deviations fit the positions.
+    touchdown: Touchdown | None  #: Place, time and manner; null of a go-around.
+    stabilised: tuple[StabilisedAt, ...]  #: Criteria at each check height.
+    position_errors: tuple[PositionError, ...]  #: Recorded positions across the course, by the localizer.
+    protection: Protection | None  #: Protection levels of the receiver; null where not logged.
+    claim: str  #: What the figures allow to be claimed, in words.
+    #: Steps in which positions are logged [north, east]; null where none shows.
     position_step_m: tuple[float, float] | None = None
-    height_errors: tuple[HeightError, ...] = ()
+    height_errors: tuple[HeightError, ...] = ()  #: Recorded altitudes against the elevation of the runway.
+    #: Why there is no touchdown; empty where there is one.
     touchdown_reason: str = ""  # why a landing has no touchdown
-    along_errors: tuple[AlongError, ...] = ()
-    criteria: tuple[Criterion, ...] = ()
-    score: Score | None = None
+    along_errors: tuple[AlongError, ...] = ()  #: Recorded positions along the course, by the glide path.
+    criteria: tuple[Criterion, ...] = ()  #: The user's own criteria.
+    score: Score | None = None  #: Share of the user's weights that was met; null without weights.
 
 
 @dataclass(frozen=True)
 class LeftOutApproach:
     """Descent that is not listed as an approach, and the reason."""
 
-    time_s: float
-    reason: str
+    time_s: float  #: Flight second of its end.
+    reason: str  #: Why it is no approach.
 
 
 @dataclass(frozen=True)
@@ -301,8 +305,8 @@ class LandingResult(Answer):
 
     analysis: ClassVar[str] = "landing"
 
-    approaches: tuple[Approach, ...]
-    left_out: tuple[LeftOutApproach, ...] = ()
+    approaches: tuple[Approach, ...]  #: Every approach, against its runway.
+    left_out: tuple[LeftOutApproach, ...] = ()  #: Descents that are not listed, with the reason.
     remarks: tuple[str, ...] = ()
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()

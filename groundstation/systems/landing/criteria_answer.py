@@ -63,8 +63,8 @@ class Place:
     """Instant of an approach: flight time, height and distance before the threshold."""
 
     time_s: float
-    height_m: float | None = None
-    before_threshold_m: float | None = None
+    height_m: float | None = None  #: Height above the threshold.
+    before_threshold_m: float | None = None  #: Distance before the threshold, negative behind it.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,12 +89,12 @@ class Criterion:
 
     name: str
     state: CriterionState
-    unit: str
-    value: float | None = None
-    sigma: float | None = None
-    at_least: float | None = None
-    at_most: float | None = None
-    at: Place | None = None
+    unit: str  #: Unit of value and limits.
+    value: float | None = None  #: What the approach shows; null where there is none.
+    sigma: float | None = None  #: Standard deviation of the value, where one is known.
+    at_least: float | None = None  #: Least value allowed; null without such a limit.
+    at_most: float | None = None  #: Greatest value allowed; null without such a limit.
+    at: Place | None = None  #: Instant of the value.
     logged_by: str = ""
     reason: str = ""
 
@@ -118,6 +118,6 @@ class Score:
     ``judged`` and ``given`` are sums of weights; criteria without a weight do not count.
     """
 
-    share: float
-    judged: float
-    given: float
+    share: float  #: Weights met over weights judged.
+    judged: float  #: Sum of the weights of criteria that were judged.
+    given: float  #: Sum of all weights.

@@ -23,12 +23,12 @@ class RunwayCandidate:
         Course flown minus that of the runway.
     """
 
-    name: str
+    name: str  #: Airport and runway as the table has them.
     probability: float
-    across_m: float
-    past_threshold_m: float
+    across_m: float  #: Where the approach ended beside its centre line, right positive.
+    past_threshold_m: float  #: Where the approach ended behind its threshold.
     course_difference_deg: float
-    is_closed: bool
+    is_closed: bool  #: Closed by the table.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,25 +81,25 @@ class RunwayUsed(Brief):
 
     name: str
     placed_by: PlacedBy
-    latitude_deg: float
-    longitude_deg: float
-    true_course_deg: float
-    course_sigma_deg: float
-    elevation_m: float | None
-    glide_angle_deg: float
-    threshold_crossing_height_m: float
-    localizer_width_m: float
-    localizer_distance_m: float
-    length_m: float | None = None
-    width_m: float | None = None
-    place_reason: str = ""
-    landing_length_m: float | None = None
-    displaced_m: float | None = None
+    latitude_deg: float  #: Latitude of the threshold.
+    longitude_deg: float  #: Longitude of the threshold.
+    true_course_deg: float  #: True course of the landing.
+    course_sigma_deg: float  #: Standard deviation of the course.
+    elevation_m: float | None  #: Height of the threshold above sea level.
+    glide_angle_deg: float  #: Angle of the glide path.
+    threshold_crossing_height_m: float  #: Height of the glide path above the threshold.
+    localizer_width_m: float  #: Full width of the course sector at the threshold.
+    localizer_distance_m: float  #: From the threshold to the localizer's antenna.
+    length_m: float | None = None  #: From end to end.
+    width_m: float | None = None  #: Width of the pavement.
+    place_reason: str = ""  #: What the place of the threshold rests on.
+    landing_length_m: float | None = None  #: From the threshold to the far end.
+    displaced_m: float | None = None  #: From the end of the pavement to the threshold.
     slope: float | None = None
-    surface: str = ""
-    is_closed: bool = False
-    along_sigma_m: float | None = None
-    across_sigma_m: float | None = None
+    surface: str = ""  #: Surface as the table names it.
+    is_closed: bool = False  #: Closed by the table.
+    along_sigma_m: float | None = None  #: Standard deviation of the threshold along the course, by the table.
+    across_sigma_m: float | None = None  #: Standard deviation of the threshold across the course, by the table.
     choice: RunwayChoice | None = None
 
     @property

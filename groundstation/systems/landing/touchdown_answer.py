@@ -35,8 +35,8 @@ class Witness:
     name: str
     topic: str
     rate_hz: float | None
-    time_s: float | None
-    sigma_s: float | None
+    time_s: float | None  #: Flight second that it alone shows; null where it shows none.
+    sigma_s: float | None  #: Half of the interval that holds 68 %.
     state: WitnessState
     reason: str = ""
 
@@ -48,9 +48,9 @@ class SecondContact:
     ``load_g`` is the normal acceleration there, ``found_by`` what shows it.
     """
 
-    time_s: float
-    load_g: float | None
-    found_by: str
+    time_s: float  #: Flight second of the contact.
+    load_g: float | None  #: Normal acceleration there.
+    found_by: str  #: What shows it.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,8 +72,8 @@ class TouchdownByStates:
     """
 
     words: str
-    sink_rate_mps: float
-    sink_rate_sigma_mps: float
+    sink_rate_mps: float  #: Sink rate just before, down positive.
+    sink_rate_sigma_mps: float  #: Standard deviation of the sink rate.
     last_sink_rate_mps: float
     past_threshold_m: float | None
     past_threshold_sigma_m: float
@@ -110,22 +110,22 @@ class Touchdown(Brief):
         The same by the best trajectory, where its checks hold.
     """
 
-    time_s: float
-    time_sigma_s: float
+    time_s: float  #: Flight second of the first contact.
+    time_sigma_s: float  #: Standard deviation, by the wider side of the interval.
     found_by: str
-    latitude_deg: float
-    longitude_deg: float
+    latitude_deg: float  #: Latitude of the place.
+    longitude_deg: float  #: Longitude of the place.
     past_threshold_m: float | None
-    ground_speed_mps: float | None
-    sink_rate_mps: float | None
+    ground_speed_mps: float | None  #: Ground speed there.
+    sink_rate_mps: float | None  #: Sink rate onto the runway just before, down positive.
     peak_load_g: float | None
     rollout_course_deg: float | None
     by_states: TouchdownByStates | None = None
     confidence95_s: tuple[float, float] | None = None
     place_sigma_m: float | None = None
-    sink_rate_sigma_mps: float | None = None
-    sink_rate_by: str = ""
-    runway_slope: float | None = None
-    runway_slope_sigma: float | None = None
+    sink_rate_sigma_mps: float | None = None  #: Standard deviation of the sink rate.
+    sink_rate_by: str = ""  #: Topic that shows the sink rate.
+    runway_slope: float | None = None  #: Rise of the ground along the roll-out, metres per metre.
+    runway_slope_sigma: float | None = None  #: Standard deviation of the slope.
     witnesses: tuple[Witness, ...] = ()
-    second_contacts: tuple[SecondContact, ...] = ()
+    second_contacts: tuple[SecondContact, ...] = ()  #: Bounces, and struts that rebound.

@@ -37,20 +37,20 @@ class Latency(Delay):
         Share of the other's motion that the reference explains, of the component explained worst.
     """
 
-    reference: str
-    other: str
+    reference: str  #: Topic of the INS that is the reference.
+    other: str  #: Topic whose latency is found.
     quantity: Quantity
-    state: LatencyState
+    state: LatencyState  #: observed, or not_observable with the reason.
     reason: str
-    latency_s: float | None = None
-    sigma_s: float | None = None
-    confidence95_s: tuple[float, float] | None = None
-    samples: int = 0
-    windows: int = 0
-    effective_windows: float | None = None
-    motion: float | None = None
-    residual: float | None = None
-    unit: str = ""
+    latency_s: float | None = None  #: Positive: the other shows a motion later, by its stamps, than the reference.
+    sigma_s: float | None = None  #: Standard deviation of the latency.
+    confidence95_s: tuple[float, float] | None = None  #: 95 % interval of the latency [low, high].
+    samples: int = 0  #: Samples of the other in the windows.
+    windows: int = 0  #: Stretches of motion that were compared.
+    effective_windows: float | None = None  #: Independent ones among them: degrees of freedom of the interval.
+    motion: float | None = None  #: RMS rate of the reference in the windows, in `unit` per second.
+    residual: float | None = None  #: RMS of what is left unexplained, in `unit`.
+    unit: str = ""  #: Unit of the quantity compared.
     explained: float | None = None
 
 
@@ -60,7 +60,7 @@ class Latencies(Answer, Delays):
 
     analysis: ClassVar[str] = "latency"
 
-    rows: tuple[Latency, ...]
+    rows: tuple[Latency, ...]  #: Every pair of a sensor and its reference.
     settings: dict[str, Any] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
 

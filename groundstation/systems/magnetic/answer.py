@@ -47,13 +47,13 @@ class AlignmentSource:
     ``reason``: why it is not used.
     """
 
-    name: SourceName
-    error_deg: float | None
-    sigma_deg: float | None
-    at_s: float | None
-    is_used: bool
-    reason: str = ""
-    verdict: str = ""
+    name: SourceName  #: Way in which the flight shows it.
+    error_deg: float | None  #: INS heading minus true heading at the time of the figure; null without a number.
+    sigma_deg: float | None  #: Standard deviation of the error.
+    at_s: float | None  #: Flight second at which it was seen.
+    is_used: bool  #: Whether the alignment rests on it.
+    reason: str = ""  #: Why it is not used; empty where it is.
+    verdict: str = ""  #: Verdict of the analysis it comes from; empty without one.
 
 
 @dataclass(frozen=True)
@@ -68,19 +68,20 @@ class Alignment:
     airframe's, less the mounting that the aircraft file states.
     """
 
-    origin: str
-    error_deg: float
-    sigma_deg: float
-    aligned_error_deg: float
-    aligned_sigma_deg: float
-    drift_deg_per_h: float
-    drift_sigma_deg_per_h: float
-    aligned_at_s: float | None
-    figure_at_s: float
-    speed_min_mps: float | None = None
+    origin: str  #: What the alignment rests on.
+    error_deg: float  #: INS heading minus true heading at figure_at_s.
+    sigma_deg: float  #: Standard deviation of error_deg.
+    aligned_error_deg: float  #: INS heading minus true heading at aligned_at_s.
+    aligned_sigma_deg: float  #: Standard deviation of aligned_error_deg.
+    drift_deg_per_h: float  #: Growth of the error between both.
+    drift_sigma_deg_per_h: float  #: Standard deviation of the growth.
+    aligned_at_s: float | None  #: Flight second at which the error was found.
+    figure_at_s: float  #: Flight second of the figure that the deviation is of.
+    speed_min_mps: float | None = None  #: Speed from which on the track may align.
+    #: Gyro drifts along forward, right, down at rest before flight; null without rates.
     gyro_drift_deg_per_h: Vector | None = None
-    gyro_drift_sigma_deg_per_h: Vector | None = None
-    sources: tuple[AlignmentSource, ...] = ()
+    gyro_drift_sigma_deg_per_h: Vector | None = None  #: Their standard deviations.
+    sources: tuple[AlignmentSource, ...] = ()  #: Every way in which the flight shows the error.
 
     def source(self, name: SourceName) -> AlignmentSource | None:
         """The source of a name."""
@@ -96,11 +97,11 @@ class DeclinationUsed:
 
     schema_name: ClassVar[str] = "declination"
 
-    value_deg: float
-    sigma_deg: float
-    model: str
-    horizontal_nt: float | None = None
-    down_nt: float | None = None
+    value_deg: float  #: Declination, east positive.
+    sigma_deg: float  #: Standard deviation of the declination.
+    model: str  #: Magnetic model and date, or the log.
+    horizontal_nt: float | None = None  #: Horizontal intensity by the model.
+    down_nt: float | None = None  #: Vertical intensity by the model, down positive.
 
 
 @dataclass(frozen=True)
@@ -112,14 +113,14 @@ class Turn:
 
     start_s: float
     end_s: float
-    bank_deg: float
-    bank_sd_deg: float
-    turned_deg: float
-    altitude_m: float | None
-    altitude_range_m: float | None
-    samples: int
-    state: TurnState
-    reason: str = ""
+    bank_deg: float  #: Mean bank, right positive.
+    bank_sd_deg: float  #: Scatter of the bank.
+    turned_deg: float  #: Heading that was turned through.
+    altitude_m: float | None  #: Mean altitude; null without one.
+    altitude_range_m: float | None  #: Highest less lowest altitude.
+    samples: int  #: Readings in it.
+    state: TurnState  #: used or rejected.
+    reason: str = ""  #: Why it is rejected; empty where it is used.
 
 
 @dataclass(frozen=True)
@@ -129,24 +130,25 @@ class Swing:
     ``difference_rms_deg`` compares its curve with that of the other figures; None where there is but one.
     """
 
-    number: int
+    number: int  #: From 1, in order of time.
     start_s: float
     end_s: float
-    right_bank_deg: float
-    left_bank_deg: float
-    covered_share: float
-    coefficients_deg: dict[str, float] = field(metadata={"keys": LETTERS})
-    sigma_deg: dict[str, float] = field(metadata={"keys": LETTERS})
+    right_bank_deg: float  #: Mean bank of the right turns.
+    left_bank_deg: float  #: Mean bank of the left turns.
+    covered_share: float  #: Share of the circle that it covers.
+    coefficients_deg: dict[str, float] = field(metadata={"keys": LETTERS})  #: A to E by this figure alone.
+    sigma_deg: dict[str, float] = field(metadata={"keys": LETTERS})  #: Standard deviation of its curve.
+    #: RMS over the circle of its curve minus that of the others; null where there is but one.
     difference_rms_deg: float | None = None
-    difference_sigma_deg: float | None = None
+    difference_sigma_deg: float | None = None  #: What their sigmas expect of that difference.
 
 
 @dataclass(frozen=True)
 class SigmaPart:
     """One contribution to the sigma of coefficient A; they add in quadrature."""
 
-    name: str
-    sigma_deg: float
+    name: str  #: Where it comes from.
+    sigma_deg: float  #: Its standard deviation; they add in quadrature.
 
 
 @dataclass(frozen=True)
@@ -157,10 +159,10 @@ class Coverage:
     with readings alone, ``interpolated_bins`` the rest of 360; ``widest_gap_deg`` without readings of both.
     """
 
-    share: float
-    measured_bins: int
-    interpolated_bins: int
-    widest_gap_deg: float
+    share: float  #: Share of the circle that both branches cover, small gaps included.
+    measured_bins: int  #: Bins of a degree with readings of both branches.
+    interpolated_bins: int  #: Other bins of the 360.
+    widest_gap_deg: float  #: Widest part of the circle without readings of both.
 
 
 @dataclass(frozen=True)
@@ -170,8 +172,8 @@ class Residual:
     The mean of the error is included.
     """
 
-    before: float
-    after: float
+    before: float  #: RMS error of the heading without correction, degrees.
+    after: float  #: RMS error of the heading with the correction, degrees.
 
 
 @dataclass(frozen=True)
@@ -181,11 +183,11 @@ class HeldOut:
     ``level_share`` is its share of all that none has seen. ``heading_sectors`` of 30 deg, of 12, were flown in it.
     """
 
-    samples: int
-    seconds: float
-    heading_sectors: int
-    level_share: float
-    largest_bank_deg: float
+    samples: int  #: Readings in it.
+    seconds: float  #: Length of it.
+    heading_sectors: int  #: Sectors of 30 deg, of 12, that it covers.
+    level_share: float  #: Its share of all that no fit has seen.
+    largest_bank_deg: float  #: Greatest bank in it.
 
 
 @dataclass(frozen=True)
@@ -215,18 +217,22 @@ class Method:
 
     schema_name: ClassVar[str] = "magnetic_method"
 
-    name: MethodName
-    state: MethodState
+    name: MethodName  #: Stable name for scripts.
+    state: MethodState  #: fitted, or refused with the reason.
     reason: str = ""
-    samples: int = 0
-    parameters: int = 0
+    samples: int = 0  #: Readings it was fitted to.
+    parameters: int = 0  #: Number of parameters fitted.
     condition_number: float | None = None
     fit_rms_nt: float | None = None
+    #: RMS error of the heading without correction, where the fit has not seen.
     held_out_before_deg: float | None = None
+    #: RMS error of the heading with the correction, where the fit has not seen.
     held_out_after_deg: float | None = None
-    held_out_mean_deg: float | None = None
-    held_out_mean_sigma_deg: float | None = None
+    held_out_mean_deg: float | None = None  #: Mean of the error after correction.
+    held_out_mean_sigma_deg: float | None = None  #: Sigma that this mean should have.
+    #: A to E of level flight; empty where refused.
     coefficients_deg: dict[str, float] = field(default_factory=dict, metadata={"keys": LETTERS})
+    #: Standard deviations of A to E.
     coefficients_sigma_deg: dict[str, float] = field(default_factory=dict, metadata={"keys": LETTERS})
 
 
@@ -241,13 +247,14 @@ class PoissonParameters:
 
     schema_name: ClassVar[str] = "poisson"
 
-    hard_iron_nt: Vector
-    hard_iron_sigma_nt: Vector
-    soft_iron: Matrix
-    soft_iron_sigma: Matrix
+    hard_iron_nt: Vector  #: Steady field of the aircraft along forward, right, down.
+    hard_iron_sigma_nt: Vector  #: Standard deviations of the hard iron.
+    soft_iron: Matrix  #: Matrix from the earth's field to the reading, body axes.
+    soft_iron_sigma: Matrix  #: Standard deviations of the matrix.
+    #: Field that an ampere makes along forward, right, down; null without a current.
     current_effect_nt_per_a: Vector | None = None
-    current_effect_sigma_nt_per_a: Vector | None = None
-    current_reference_a: float | None = None
+    current_effect_sigma_nt_per_a: Vector | None = None  #: Standard deviations of the current's effect.
+    current_reference_a: float | None = None  #: Current at which the hard iron holds.
 
 
 @dataclass(frozen=True)
@@ -257,9 +264,9 @@ class BankBias:
     The error is forecast from the fitted iron.
     """
 
-    bank_deg: float
-    rms_deg: float
-    is_flown: bool = False
+    bank_deg: float  #: Bank of both turns.
+    rms_deg: float  #: RMS error over the circle.
+    is_flown: bool = False  #: Whether the flight has turns of this bank.
 
 
 @dataclass(frozen=True)
@@ -272,12 +279,12 @@ class OtherCondition:
     sigma, ``largest_deg`` the most; None where they are not known. ``told`` says it in words.
     """
 
-    name: ConditionName
-    size_deg: float | None
-    sigma_deg: float | None
-    largest_deg: float | None
-    told: str
-    added_nt: Vector | None = None
+    name: ConditionName  #: pitch, for each degree more; ground; or gain, by sensors that drift.
+    size_deg: float | None  #: RMS change of the deviation over the circle; null where not known.
+    sigma_deg: float | None  #: Standard deviation of the size.
+    largest_deg: float | None  #: Greatest change over the circle.
+    told: str  #: The same in words.
+    added_nt: Vector | None = None  #: Field that is only there, along forward, right, down.
 
 
 @dataclass(frozen=True)
@@ -288,11 +295,11 @@ class CardRow:
     no reading of both branches near it.
     """
 
-    magnetic_heading_deg: float
-    steer_deg: float
-    deviation_deg: float
-    sigma_deg: float
-    is_interpolated: bool
+    magnetic_heading_deg: float  #: Heading to fly.
+    steer_deg: float  #: Reading to hold, not corrected.
+    deviation_deg: float  #: To be added to the reading.
+    sigma_deg: float  #: Standard deviation of the deviation.
+    is_interpolated: bool  #: No reading of both branches near it.
 
 
 @dataclass(frozen=True)
@@ -327,32 +334,34 @@ class MagneticResult(Answer, CompassCoefficients):
     analysis: ClassVar[str] = "magnetic"
     schema_name: ClassVar[str] = analysis
 
-    ins_topic: str
-    magnetometer_topic: str
+    ins_topic: str  #: Topic of the INS whose attitude is used.
+    magnetometer_topic: str  #: Topic of the magnetometer, or of the magnetic heading.
+    #: accept: every required gate passed; reject: one failed; undecided: one was not measured.
     verdict: MagneticVerdict
-    verdict_reason: str
-    recommended_method: MethodName
-    recommendation: str
+    verdict_reason: str  #: Gate that decided it, for people.
+    recommended_method: MethodName  #: Method to correct by.
+    recommendation: str  #: Why that method.
+    #: A to E of error = A + B sin c + C cos c + D sin 2c + E cos 2c, c the magnetic heading as read.
     coefficients_deg: dict[str, float] = field(metadata={"keys": LETTERS})
-    coefficients_sigma_deg: dict[str, float] = field(metadata={"keys": LETTERS})
-    a_parts: tuple[SigmaPart, ...]
+    coefficients_sigma_deg: dict[str, float] = field(metadata={"keys": LETTERS})  #: Standard deviations of A to E.
+    a_parts: tuple[SigmaPart, ...]  #: What the sigma of A is made of.
     compass_error_deg: tuple[float, ...] = field(metadata={"items": 360})
     deviation_deg: tuple[float, ...] = field(metadata={"items": 360})
-    coverage: Coverage
+    coverage: Coverage  #: Part of the circle of headings that was flown.
     residual_rms_deg: Residual | None
-    alignment: Alignment
-    declination: DeclinationUsed
-    gates: tuple[Gate, ...]
-    methods: tuple[Method, ...]
-    turns: tuple[Turn, ...]
-    swings: tuple[Swing, ...]
-    bank_bias: tuple[BankBias, ...]
-    card: tuple[CardRow, ...]
-    held_out: HeldOut | None = None
-    poisson: PoissonParameters | None = None
-    modulus: PoissonParameters | None = None
-    table_fit_rms_deg: float | None = None
-    attitude_wander_deg: float | None = None
+    alignment: Alignment  #: INS heading error that was taken off before.
+    declination: DeclinationUsed  #: Declination used.
+    gates: tuple[Gate, ...]  #: Conditions of the verdict, each with figure and limit.
+    methods: tuple[Method, ...]  #: Every method tried, with its error on what it has not seen.
+    turns: tuple[Turn, ...]  #: Turns of the flight, used or not.
+    swings: tuple[Swing, ...]  #: Every figure of opposite turns by itself.
+    bank_bias: tuple[BankBias, ...]  #: What the average of opposite banks leaves in level flight.
+    card: tuple[CardRow, ...]  #: Steer card: reading to hold for each magnetic heading.
+    held_out: HeldOut | None = None  #: Level part of the flight that no fit has seen; null where nothing was left.
+    poisson: PoissonParameters | None = None  #: Iron of the aircraft; null where it was not fitted.
+    modulus: PoissonParameters | None = None  #: Iron by the size of the field alone; null where it was not fitted.
+    table_fit_rms_deg: float | None = None  #: RMS of the 360 bins about the curve A to E.
+    attitude_wander_deg: float | None = None  #: What roll and pitch of the INS are wrong by in the mean of the figure.
     other_conditions: tuple[OtherCondition, ...] = ()
     remarks: tuple[str, ...] = ()
     settings: dict[str, float | str | bool] = field(default_factory=dict)

@@ -30,11 +30,11 @@ class FluxReference:
     ``sigma_deg`` is what is common to the whole flight: it goes into A one to one.
     """
 
-    name: ReferenceName
-    topic: str
-    is_used: bool
-    sigma_deg: float | None
-    reason: str = ""
+    name: ReferenceName  #: states (best trajectory), ins or wind triangle.
+    topic: str  #: Topic it comes from.
+    is_used: bool  #: Whether the legs are judged by it.
+    sigma_deg: float | None  #: Sigma common to the whole flight: it goes into A one to one.
+    reason: str = ""  #: Why it is not used, or what it rests on.
 
 
 @dataclass(frozen=True)
@@ -44,11 +44,11 @@ class WindSolved:
     ``changes_mps`` is the standard deviation of its slow changes, a component; ``airspeed_scale`` true over logged.
     """
 
-    north_mps: float
-    east_mps: float
-    changes_mps: float
-    airspeed_scale: float
-    airspeed_scale_sigma: float
+    north_mps: float  #: Velocity of the air towards north.
+    east_mps: float  #: Velocity of the air towards east.
+    changes_mps: float  #: Standard deviation of its slow changes, a component.
+    airspeed_scale: float  #: True over logged airspeed.
+    airspeed_scale_sigma: float  #: Standard deviation of that scale.
 
 
 @dataclass(frozen=True)
@@ -61,27 +61,29 @@ class FluxLeg:
 
     start_s: float
     end_s: float
-    magnetic_heading_deg: float
-    true_heading_deg: float | None
-    error_deg: float | None
-    noise_sigma_deg: float | None
-    sigma_deg: float | None
-    speed_mps: float
-    altitude_m: float | None
-    samples: int
-    state: LegState
-    reason: str = ""
+    magnetic_heading_deg: float  #: Mean magnetic heading as read.
+    true_heading_deg: float | None  #: Mean true heading of the reference.
+    error_deg: float | None  #: Magnetic heading + declination - true heading.
+    noise_sigma_deg: float | None  #: Standard deviation of the reading.
+    sigma_deg: float | None  #: Standard deviation of the whole error, reference and declination in it.
+    speed_mps: float  #: Mean ground speed.
+    altitude_m: float | None  #: Mean altitude; null without one.
+    samples: int  #: Readings in it.
+    state: LegState  #: used or rejected.
+    reason: str = ""  #: Why it is rejected; empty where it is used.
 
 
 @dataclass(frozen=True)
 class FluxMethod:
     """One way to find the coefficients, given or refused with the reason."""
 
-    name: FluxMethodName
-    state: Literal["fitted", "refused"]
-    reason: str = ""
-    samples: int = 0
+    name: FluxMethodName  #: Stable name for scripts.
+    state: Literal["fitted", "refused"]  #: fitted, or refused with the reason.
+    reason: str = ""  #: Why it is refused; empty where it is fitted.
+    samples: int = 0  #: Readings it was fitted to.
+    #: A to E of level flight; empty where refused.
     coefficients_deg: dict[str, float] = field(default_factory=dict, metadata={"keys": LETTERS})
+    #: Standard deviations of A to E.
     coefficients_sigma_deg: dict[str, float] = field(default_factory=dict, metadata={"keys": LETTERS})
 
 
@@ -95,17 +97,17 @@ class BankError:
     limit of the settings. ``worst_deg`` is the largest error by bank in the flight.
     """
 
-    state: Literal["found", "not observable"]
-    reason: str
-    turns: int
-    lean: float | None = None
-    lean95: tuple[float, float] | None = None
-    lag_s: float | None = None
-    lag95_s: tuple[float, float] | None = None
-    rate_lag_s: float | None = None
-    worst_deg: float | None = None
-    bank_max_deg: float | None = None
-    after_turn_s: float | None = None
+    state: Literal["found", "not observable"]  #: found or not observable.
+    reason: str  #: Why it is not observable; empty where it is found.
+    turns: int  #: Turns it rests on.
+    lean: float | None = None  #: Share of the bank by which the sensing element leans: 1 hangs free, 0 is kept level.
+    lean95: tuple[float, float] | None = None  #: 95 % interval of the lean [low, high].
+    lag_s: float | None = None  #: Time over which the reading follows the element.
+    lag95_s: tuple[float, float] | None = None  #: 95 % interval of the lag [low, high].
+    rate_lag_s: float | None = None  #: Lag of the reading by turn rate.
+    worst_deg: float | None = None  #: Largest error by bank in the flight.
+    bank_max_deg: float | None = None  #: Bank beyond which the heading is off by more than the limit.
+    after_turn_s: float | None = None  #: Seconds after a turn until the heading is good again.
 
 
 @dataclass(frozen=True)
@@ -135,29 +137,30 @@ class FluxDeviation(Answer):
     schema_name: ClassVar[str] = analysis
 
     ins_topic: str
+    #: accept: every required gate passed; reject: one failed; undecided: one was not measured.
     verdict: MagneticVerdict
-    verdict_reason: str
-    recommended_method: FluxMethodName
+    verdict_reason: str  #: Gate that decided it, for people.
+    recommended_method: FluxMethodName  #: Method to correct by.
     references: tuple[FluxReference, ...]
-    declination: DeclinationUsed
-    legs: tuple[FluxLeg, ...]
-    methods: tuple[FluxMethod, ...]
+    declination: DeclinationUsed  #: Declination used.
+    legs: tuple[FluxLeg, ...]  #: Straight legs, used or not.
+    methods: tuple[FluxMethod, ...]  #: Every method tried.
     coefficients: tuple[GroundCoefficient, ...]
-    a_parts: tuple[SigmaPart, ...]
-    bank_error: BankError
-    directions: int
-    widest_gap_deg: float
-    settle_s: float
-    place_sigma_deg: float
-    gates: tuple[Gate, ...]
-    card: tuple[CardRow, ...]
+    a_parts: tuple[SigmaPart, ...]  #: What the sigma of A is made of.
+    bank_error: BankError  #: Error by bank and slaving.
+    directions: int  #: Directions that the used legs have.
+    widest_gap_deg: float  #: Widest part of the circle without a leg.
+    settle_s: float  #: Seconds after a turn that are left out until the compass has settled.
+    place_sigma_deg: float  #: What each leg has of its own beyond noise, one sigma.
+    gates: tuple[Gate, ...]  #: Conditions of the verdict, each with figure and limit.
+    card: tuple[CardRow, ...]  #: Steer card: reading to hold for each magnetic heading.
     deviation_deg: tuple[float, ...] = field(metadata={"items": 360})
-    wind: WindSolved | None = None
-    along: AlongAxis | None = None
+    wind: WindSolved | None = None  #: Wind that the flight shows; null without airspeed.
+    along: AlongAxis | None = None  #: What is seen along an axis where B or C alone is not.
     residual_rms_deg: Residual | None = None
-    dip_deg: float | None = None
-    logged_variation_deg: float | None = None
-    heading_step_deg: float | None = None
+    dip_deg: float | None = None  #: Dip of the field by the model.
+    logged_variation_deg: float | None = None  #: Mean of what the device takes for declination; null where not logged.
+    heading_step_deg: float | None = None  #: Step in which the log writes the heading; null where none shows.
     remarks: tuple[str, ...] = ()
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()

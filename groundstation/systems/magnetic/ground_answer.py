@@ -40,25 +40,25 @@ class GroundRun:
     start_s: float
     end_s: float
     phase: str
-    magnetic_heading_deg: float
-    track_deg: float
-    declination_deg: float
+    magnetic_heading_deg: float  #: Mean magnetic heading as read.
+    track_deg: float  #: Mean true track.
+    declination_deg: float  #: Declination there, east positive.
     error_deg: float | None
     noise_sigma_deg: float | None
     sigma_deg: float | None
-    samples: int
-    speed_mps: float
+    samples: int  #: Epochs in it.
+    speed_mps: float  #: Mean ground speed.
     heading_change_deg: float
-    state: RunState
-    reason: str = ""
+    state: RunState  #: used or rejected.
+    reason: str = ""  #: Why it is rejected; empty where it is used.
 
 
 @dataclass(frozen=True)
 class LeftOut:
     """GNSS epochs that belong to no run, and the reason."""
 
-    reason: str
-    epochs: int
+    reason: str  #: Why they belong to no run.
+    epochs: int  #: Number of them.
 
 
 @dataclass(frozen=True)
@@ -68,11 +68,11 @@ class GroundCoefficient:
     ``value_deg`` is None where the runs do not show it; ``sigma_deg`` is what they leave of it.
     """
 
-    letter: str = field(metadata={"one_of": LETTERS})
-    value_deg: float | None
-    sigma_deg: float
-    state: CoefficientState
-    reason: str = ""
+    letter: str = field(metadata={"one_of": LETTERS})  #: Which of A to E.
+    value_deg: float | None  #: Coefficient of the error; null where it is not seen.
+    sigma_deg: float  #: Standard deviation, or what is left open of it.
+    state: CoefficientState  #: found or not observable.
+    reason: str = ""  #: Why it is not observable; empty where it is found.
 
 
 @dataclass(frozen=True)
@@ -82,9 +82,9 @@ class AlongAxis:
     The part is ``value_deg`` x cos(heading - ``axis_deg``), the axis in [0, 180).
     """
 
-    axis_deg: float
-    value_deg: float
-    sigma_deg: float
+    axis_deg: float  #: Heading of the axis, 0 to 180.
+    value_deg: float  #: Error along it: value x cos(heading - axis).
+    sigma_deg: float  #: Standard deviation of the value.
 
 
 @dataclass(frozen=True)
@@ -94,10 +94,10 @@ class Repeat:
     The latter is that by their noise and slip alone.
     """
 
-    magnetic_heading_deg: float
-    runs: int
-    spread_deg: float
-    expected_deg: float
+    magnetic_heading_deg: float  #: Their mean heading.
+    runs: int  #: Number of them.
+    spread_deg: float  #: Spread of their errors.
+    expected_deg: float  #: Spread by noise and slip alone.
 
 
 @dataclass(frozen=True)
@@ -132,20 +132,20 @@ class GroundDeviation(Answer):
     analysis: ClassVar[str] = "magnetic_ground"
     schema_name: ClassVar[str] = analysis
 
-    ins_topic: str
+    ins_topic: str  #: Topic of the magnetic heading.
     gnss_topic: str
     declination: DeclinationUsed
-    runs: tuple[GroundRun, ...]
-    left_out: tuple[LeftOut, ...]
-    directions: int
-    widest_gap_deg: float
+    runs: tuple[GroundRun, ...]  #: Straight runs on the ground, used or not.
+    left_out: tuple[LeftOut, ...]  #: Epochs that belong to no run, by reason.
+    directions: int  #: Directions that the used runs have.
+    widest_gap_deg: float  #: Widest part of the circle without a run.
     place_sigma_deg: float
     coefficients: tuple[GroundCoefficient, ...]
     along: AlongAxis | None = None
-    repeats: tuple[Repeat, ...] = ()
+    repeats: tuple[Repeat, ...] = ()  #: Runs on about one heading against each other.
     logged_variation_deg: float | None = None
-    heading_step_deg: float | None = None
-    track_step_deg: float | None = None
+    heading_step_deg: float | None = None  #: Step in which the log writes the heading; null where none shows.
+    track_step_deg: float | None = None  #: Step in which the log writes the track; null where none shows.
     remarks: tuple[str, ...] = ()
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()

@@ -39,18 +39,19 @@ class Spread:
         Statistics of the error with its sign; ``largest`` of a length (axis ``horizontal``) is the worst.
     """
 
-    samples: int
+    samples: int  #: Number of errors.
     effective_samples: float
-    mean: float
-    std: float
-    rmse: float
-    median: float
-    smallest: float
-    largest: float
+    mean: float  #: Mean of subject minus reference.
+    std: float  #: Standard deviation about the mean.
+    rmse: float  #: Root mean square.
+    median: float  #: Middle value.
+    smallest: float  #: Least value, with its sign.
+    largest: float  #: Greatest value; of a length the worst.
+    #: 95 % interval of the mean [low, high]; null with too few independent samples.
     mean95: tuple[float, float] | None = None
-    std95: tuple[float, float] | None = None
-    rmse95: tuple[float, float] | None = None
-    median95: tuple[float, float] | None = None
+    std95: tuple[float, float] | None = None  #: 95 % interval of the standard deviation [low, high].
+    rmse95: tuple[float, float] | None = None  #: 95 % interval of the root mean square [low, high].
+    median95: tuple[float, float] | None = None  #: 95 % interval of the median [low, high].
 
 
 @dataclass(frozen=True)
@@ -62,13 +63,13 @@ class ErrorRow:
     None where it claims nothing; ``is_coarse``: it is so large that most of the error may be the reference's own.
     """
 
-    subject: str
-    quantity: Quantity
-    axis: str
+    subject: str  #: Recording or estimate that is judged.
+    quantity: Quantity  #: position, velocity or attitude.
+    axis: str  #: along, cross, vertical, horizontal, roll, pitch or heading.
     unit: str
-    spread: Spread
-    reference_sigma: float | None
-    is_coarse: bool = False
+    spread: Spread  #: Statistics of the error.
+    reference_sigma: float | None  #: What the reference claims of itself, RMS; null where it claims nothing.
+    is_coarse: bool = False  #: Most of the error may be the reference's own.
 
 
 @dataclass(frozen=True)
@@ -79,17 +80,17 @@ class ClaimRow:
     those of north and east together; ``confidence95`` is of the share, by the effective number of samples.
     """
 
-    subject: str
-    quantity: Quantity
-    axis: str
+    subject: str  #: Recording or estimate that is judged.
+    quantity: Quantity  #: position, velocity or attitude.
+    axis: str  #: Axis as of the errors.
     unit: str
-    samples: int
-    effective_samples: float
-    claimed_sigma: float
-    reference_sigma: float | None
-    share_inside95: float
-    confidence95: tuple[float, float]
-    state: ClaimState
+    samples: int  #: Number of errors.
+    effective_samples: float  #: Independent errors that would tell as much.
+    claimed_sigma: float  #: Sigma that the subject claims, RMS.
+    reference_sigma: float | None  #: Sigma that the reference claims, RMS.
+    share_inside95: float  #: Share of the errors inside the 95 % that both claim together.
+    confidence95: tuple[float, float]  #: 95 % interval of that share [low, high].
+    state: ClaimState  #: consistent, too_sure, too_careful, or why it cannot be told.
 
 
 @dataclass(frozen=True)
@@ -99,10 +100,10 @@ class PathRow:
     The yaw is in degrees.
     """
 
-    subject: str
-    alignment: Alignment
-    rmse_m: float
-    yaw_deg: float | None = None
+    subject: str  #: Recording or estimate that is judged.
+    alignment: Alignment  #: What was taken out before: nothing, a shift, a shift and a turn.
+    rmse_m: float  #: RMS of the horizontal position error then.
+    yaw_deg: float | None = None  #: Turn that was taken out.
 
 
 @dataclass(frozen=True)
@@ -113,16 +114,16 @@ class RelativeRow:
     independent. ``share_of_way`` is the RMS over the mean way between the two ends.
     """
 
-    subject: str
-    length: float
-    unit: str = field(metadata={"one_of": ("s", "m")})
-    pairs: int
-    effective_pairs: float
-    rmse_m: float
-    rmse95_m: tuple[float, float] | None
-    median_m: float
-    largest_m: float
-    share_of_way: float | None
+    subject: str  #: Recording or estimate that is judged.
+    length: float  #: Time or distance over which the error changes, in `unit`.
+    unit: str = field(metadata={"one_of": ("s", "m")})  #: s or m, of `length`.
+    pairs: int  #: Overlapping pairs of ends.
+    effective_pairs: float  #: Independent ones among them.
+    rmse_m: float  #: RMS change of the horizontal position error.
+    rmse95_m: tuple[float, float] | None  #: 95 % interval of the RMS [low, high].
+    median_m: float  #: Median change.
+    largest_m: float  #: Largest change.
+    share_of_way: float | None  #: RMS over the mean way between the two ends.
 
 
 @dataclass(frozen=True)
@@ -145,18 +146,18 @@ class Placed:
         Horizontal RMS of the errors with the arm in them, and as they are judged.
     """
 
-    subject: str
-    arm_state: Observed
-    clock_state: Observed
-    reason: str
-    arm_forward_m: float | None
-    arm_right_m: float | None
+    subject: str  #: Recording or estimate that is judged.
+    arm_state: Observed  #: Whether the arm was observed, stated or not observable.
+    clock_state: Observed  #: Whether the offset was observed, stated or not observable.
+    reason: str  #: What it rests on, or why it is not observable.
+    arm_forward_m: float | None  #: From the reference's point to the subject's, forward.
+    arm_right_m: float | None  #: From the reference's point to the subject's, right.
     arm_half_width_m: float | None
     clock_offset_s: float | None
-    clock_offset95_s: tuple[float, float] | None
-    rmse_with_arm_m: float
-    rmse_m: float
-    is_arm_taken_out: bool = False
+    clock_offset95_s: tuple[float, float] | None  #: 95 % interval of the offset [low, high].
+    rmse_with_arm_m: float  #: Horizontal RMS error with the arm in it.
+    rmse_m: float  #: Horizontal RMS error as judged.
+    is_arm_taken_out: bool = False  #: Whether the arm was taken out before judging.
 
 
 @dataclass(frozen=True)
@@ -168,27 +169,27 @@ class HeadingCheck:
     """
 
     ins_topic: str
-    claimed_deg: float
-    claimed95_deg: tuple[float, float]
-    seen_deg: float
-    seen95_deg: tuple[float, float]
-    difference_deg: float
-    sigma_deg: float
+    claimed_deg: float  #: Heading error that the analysis found.
+    claimed95_deg: tuple[float, float]  #: Its 95 % interval [low, high].
+    seen_deg: float  #: INS minus reference at the same samples.
+    seen95_deg: tuple[float, float]  #: Its 95 % interval [low, high].
+    difference_deg: float  #: Claimed minus seen.
+    sigma_deg: float  #: Standard deviation of the difference.
     samples: int
-    is_inside: bool
+    is_inside: bool  #: The difference is within the 95 % that both claim.
 
 
 @dataclass(frozen=True)
 class ForecastCheck:
     """Replayed forecast of the position error, against the reference, at one horizon."""
 
-    method: str
-    horizon_min: float
-    starts: int
-    rmse_m: float
-    raw_rmse_m: float
-    share_inside95: float | None
-    confidence95: tuple[float, float] | None
+    method: str  #: How the error is forecast.
+    horizon_min: float  #: Minutes since GNSS was lost.
+    starts: int  #: Outages replayed.
+    rmse_m: float  #: RMS error of the forecast position.
+    raw_rmse_m: float  #: RMS error of the raw INS.
+    share_inside95: float | None  #: Share of the errors inside the 95 % claimed.
+    confidence95: tuple[float, float] | None  #: 95 % interval of that share [low, high].
 
 
 @dataclass(frozen=True)
@@ -216,17 +217,17 @@ class ReferenceResult(Answer):
 
     reference: str
     is_judge: bool
-    reason: str
-    interval_s: float
-    covered_share: float
-    longest_gap_s: float
-    placed: tuple[Placed, ...]
-    errors: tuple[ErrorRow, ...]
-    claims: tuple[ClaimRow, ...] = ()
-    paths: tuple[PathRow, ...] = ()
-    relative: tuple[RelativeRow, ...] = ()
-    headings: tuple[HeadingCheck, ...] = ()
-    forecasts: tuple[ForecastCheck, ...] = ()
+    reason: str  #: Why it judges nothing; empty where it judges.
+    interval_s: float  #: Median time between samples of the reference.
+    covered_share: float  #: Share of the flight that the reference covers.
+    longest_gap_s: float  #: Longest gap of the reference.
+    placed: tuple[Placed, ...]  #: Arm and clock of each subject against the reference.
+    errors: tuple[ErrorRow, ...]  #: Errors of each subject, by axis.
+    claims: tuple[ClaimRow, ...] = ()  #: Whether the sigmas that are claimed hold.
+    paths: tuple[PathRow, ...] = ()  #: Absolute trajectory errors.
+    relative: tuple[RelativeRow, ...] = ()  #: Errors over a time or a distance.
+    headings: tuple[HeadingCheck, ...] = ()  #: Heading errors found, against the reference.
+    forecasts: tuple[ForecastCheck, ...] = ()  #: Replayed forecasts, against the reference.
     settings: dict[str, Any] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
 

@@ -26,14 +26,15 @@ class JoinedStretch:
         Positive: the log's clock is fast.
     """
 
-    start_s: float
-    end_s: float
-    method: JoinMethod
+    start_s: float  #: Second of the joined flight at its beginning.
+    end_s: float  #: Second of the joined flight at its end.
+    method: JoinMethod  #: What places it in time.
     offset_s: float
+    #: Half of the 95 % interval of the offset in its middle; null where nothing tells it.
     half_width95_s: float | None = None
-    largest_half_width95_s: float | None = None
-    drift_ppm: float | None = None
-    drift_half_width95_ppm: float | None = None
+    largest_half_width95_s: float | None = None  #: The same where it is widest.
+    drift_ppm: float | None = None  #: Parts per million, positive where the log's clock is fast.
+    drift_half_width95_ppm: float | None = None  #: Half of the 95 % interval of the drift.
 
 
 @dataclass(frozen=True)
@@ -65,21 +66,21 @@ class JoinedLog(Brief):
     """
 
     label: str
-    source_name: str
-    sha256: str
-    reader: str
+    source_name: str  #: File name without folders.
+    sha256: str  #: SHA-256 of the file.
+    reader: str  #: Format as the reader names it.
     rows: int
     method: JoinMethod
     reason: str = ""
     reordered: int = 0
     remarks: tuple[str, ...] = ()
     signals: tuple[str, ...] = ()
-    reference_topic: str = ""
-    topic: str = ""
+    reference_topic: str = ""  #: Topic of the first log that was compared; empty without a comparison.
+    topic: str = ""  #: Topic of this log that was compared.
     correlation: float | None = None
-    gnss_less_motion_s: float | None = None
-    gnss_less_motion_half_width95_s: float | None = None
-    stretches: tuple[JoinedStretch, ...] = ()
+    gnss_less_motion_s: float | None = None  #: Offset by GNSS time less the offset by motion: a check of either.
+    gnss_less_motion_half_width95_s: float | None = None  #: Half of the 95 % interval of that difference.
+    stretches: tuple[JoinedStretch, ...] = ()  #: Offset of its clock over time.
 
 
 @dataclass(frozen=True)
@@ -93,10 +94,10 @@ class Joining:
 class ChosenSource:
     """Source of a kind that the analyses use, among those of the logs, and the reason."""
 
-    kind: str
-    topic: str
-    why: str
-    others: tuple[str, ...] = ()
+    kind: str  #: Kind of source: ins, gnss and so on.
+    topic: str  #: Topic used.
+    why: str  #: Reason for the choice.
+    others: tuple[str, ...] = ()  #: Topics that were not used.
 
 
 @dataclass(frozen=True)
@@ -106,12 +107,12 @@ class MotionAgreement:
     ``residual_rms`` and ``motion_rms`` in ``unit``, of ``signal``, at the samples of the joined log.
     """
 
-    label: str
-    signal: str
+    label: str  #: Label of the joined log.
+    signal: str  #: Signal compared.
     unit: str
     samples: int
-    motion_rms: float
-    residual_rms: float
+    motion_rms: float  #: RMS of the motion itself.
+    residual_rms: float  #: RMS of the difference.
 
 
 @dataclass(frozen=True)
@@ -120,8 +121,8 @@ class Together(Answer):
 
     analysis: ClassVar[str] = "together"
 
-    logs: tuple[JoinedLog, ...]
-    sources: tuple[ChosenSource, ...] = ()
-    agreement: tuple[MotionAgreement, ...] = ()
+    logs: tuple[JoinedLog, ...]  #: Every log with its place in time.
+    sources: tuple[ChosenSource, ...] = ()  #: Topic that the analyses use of each kind, and why.
+    agreement: tuple[MotionAgreement, ...] = ()  #: How well the motions of the logs agree.
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()

@@ -21,8 +21,8 @@ class AidRow:
         Its readings cannot be right.
     """
 
-    name: AidName
+    name: AidName  #: Which aid.
     topic: str
-    is_used: bool
+    is_used: bool  #: Whether the solution rests on it.
     reason: str
     is_wrong: bool = False

@@ -67,9 +67,9 @@ class UnitMounting:
 
     source: MountingSource
     words: str
-    roll_deg: float = 0.0
-    pitch_deg: float = 0.0
-    yaw_deg: float = 0.0
+    roll_deg: float = 0.0  #: Roll of the case in the body.
+    pitch_deg: float = 0.0  #: Pitch of the case in the body.
+    yaw_deg: float = 0.0  #: Yaw of the case in the body, clockwise.
     sigma_deg: float | None = None
     off_deg: float | None = None
     to_state_deg: tuple[float, float, float] | None = None
@@ -91,10 +91,10 @@ class TrajectoryAccuracy:
         Flight time of the worst.
     """
 
-    quantity: Quantity
+    quantity: Quantity  #: Quantity that the sigmas are of.
     unit: str
-    median_sigma: float
-    worst_sigma: float
+    median_sigma: float  #: Median over time; horizontal: both axes together.
+    worst_sigma: float  #: Largest over time.
     median_within95: float
     worst_s: float | None = None
 
@@ -106,11 +106,11 @@ class NoiseRow:
     ``is_at_bound``: the fit stopped at the bound that the class allows.
     """
 
-    name: str
+    name: str  #: Noise for people.
     unit: str
-    prior: float
-    fitted: float
-    is_at_bound: bool = False
+    prior: float  #: Value of the class.
+    fitted: float  #: Value that the log shows.
+    is_at_bound: bool = False  #: The fit stopped at the bound that the class allows.
 
 
 @dataclass(frozen=True)
@@ -120,13 +120,13 @@ class TrajectoryParameter:
     ``is_observable`` is false where the data hardly narrow it. ``group`` is the name without its axis: "gyro bias".
     """
 
-    name: str
-    group: str
+    name: str  #: Parameter with its axis.
+    group: str  #: Name without its axis.
     unit: str
-    value: float
-    sigma: float
-    start_sigma: float
-    is_observable: bool
+    value: float  #: Estimate over the log.
+    sigma: float  #: Its standard deviation.
+    start_sigma: float  #: Standard deviation before the log was seen.
+    is_observable: bool  #: False where the data say nothing of it.
 
     @property
     def is_far(self) -> bool:
@@ -184,29 +184,29 @@ class BestTrajectory(Answer, StatesAlongTheFlight, ErrorsOfFilter):
 
     state: TrajectoryState
     reasons: tuple[str, ...]
-    imu: str
-    gnss: str
+    imu: str  #: Topic of the inertial unit.
+    gnss: str  #: Topic of the GNSS.
     is_integral: bool
-    imu_rate_hz: float
+    imu_rate_hz: float  #: Samples of the inertial unit a second.
     vehicle: str
-    segments: tuple[TrajectorySegment, ...]
+    segments: tuple[TrajectorySegment, ...]  #: Stretches without a gap of the inertial unit.
     moving_s: float
-    mounting: UnitMounting
-    accuracy: tuple[TrajectoryAccuracy, ...]
+    mounting: UnitMounting  #: Angles of the unit in the body.
+    accuracy: tuple[TrajectoryAccuracy, ...]  #: Sigmas of each quantity over the flight.
     gates: tuple[Gate, ...] = ()
-    raised: tuple[RaisedSigma, ...] = ()
-    noise: tuple[NoiseRow, ...] = ()
-    parameters: tuple[TrajectoryParameter, ...] = ()
-    innovations: tuple[InnovationRow, ...] = ()
-    held_out: tuple[HeldOutRow, ...] = ()
-    own_track: AgainstOwnTrack | None = None
-    outages: tuple[OutageRow, ...] = ()
-    outage_truth: OutageTruth = "undisturbed solution"
+    raised: tuple[RaisedSigma, ...] = ()  #: Factors by which sigmas were raised, and why.
+    noise: tuple[NoiseRow, ...] = ()  #: Noise of the model as the log shows it.
+    parameters: tuple[TrajectoryParameter, ...] = ()  #: Biases, arms and delays that the log shows.
+    innovations: tuple[InnovationRow, ...] = ()  #: Whether each sensor fits what its covariance expects.
+    held_out: tuple[HeldOutRow, ...] = ()  #: Agreement with GNSS that the solution has not seen.
+    own_track: AgainstOwnTrack | None = None  #: Heading against the track of what rolls; null else.
+    outages: tuple[OutageRow, ...] = ()  #: Error after replayed losses of GNSS, by length.
+    outage_truth: OutageTruth = "undisturbed solution"  #: What the replayed outages are judged by.
     hypotheses: tuple[HeadingHypothesis, ...] = ()
     aids: tuple[AidRow, ...] = ()
     onboard: OnboardErrors | None = None
     other_filters: tuple[OnboardErrors, ...] = ()
-    separation: tuple[SeparationRow, ...] = ()
+    separation: tuple[SeparationRow, ...] = ()  #: Forward filter against the smoothed solution.
     settings: dict[str, Any] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
 

@@ -14,20 +14,20 @@ OutageTruth = Literal["undisturbed solution", "RTK"]
 class RaisedSigma:
     """Factor by which sigmas were raised, 1 where they held, and what asked for it."""
 
-    name: Literal["position", "height", "velocity", "tilt", "heading"]
-    factor: float
-    reason: str = ""
+    name: Literal["position", "height", "velocity", "tilt", "heading"]  #: Group of states.
+    factor: float  #: 1 where the sigmas held.
+    reason: str = ""  #: Check that asked for it.
 
 
 @dataclass(frozen=True)
 class InnovationRow:
     """Mean squared innovation of one sensor over what its covariance expects."""
 
-    sensor: str
-    ratio: float
-    count: int
-    low: float = 0.5
-    high: float = 2.0
+    sensor: str  #: Sensor whose measurements are judged.
+    ratio: float  #: Mean squared innovation over what the covariance expects; 1 is honest.
+    count: int  #: Number of innovations.
+    low: float = 0.5  #: Lower limit of an honest ratio.
+    high: float = 2.0  #: Upper limit of an honest ratio.
 
     @property
     def is_inside(self) -> bool:
@@ -43,14 +43,14 @@ class HeldOutRow:
     ``used_count`` values that were used.
     """
 
-    quantity: Quantity
+    quantity: Quantity  #: Quantity compared.
     unit: str
-    count: int
-    error_rms: float
-    sigma_rms: float
-    inside95_share: float
-    used_rms: float | None = None
-    used_count: int = 0
+    count: int  #: Values held out.
+    error_rms: float  #: RMS of GNSS minus solution.
+    sigma_rms: float  #: What both sigmas expect of it.
+    inside95_share: float  #: Share of the errors inside 95 % of both sigmas.
+    used_rms: float | None = None  #: The same RMS of values that were used.
+    used_count: int = 0  #: Values that were used.
 
 
 @dataclass(frozen=True)
@@ -61,8 +61,8 @@ class AgainstOwnTrack:
     """
 
     samples: int
-    mad_deg: float
-    scatter_100_s_deg: float | None = None
+    mad_deg: float  #: Median absolute deviation of heading minus track.
+    scatter_100_s_deg: float | None = None  #: Scatter of the medians over 100 s.
 
 
 @dataclass(frozen=True)
@@ -89,17 +89,17 @@ class OutageRow:
         Largest of the outages.
     """
 
-    length_s: float
-    count: int
+    length_s: float  #: Length of each outage.
+    count: int  #: Outages replayed.
     smoothed_rms_m: float
     forward_end_rms_m: float | None
     inside95_share: float
     rms_over_sigma: float
     seconds: float
-    vertical_rms_m: float | None = None
-    vertical_inside95_share: float | None = None
-    smoothed_worst_m: float | None = None
-    forward_end_worst_m: float | None = None
+    vertical_rms_m: float | None = None  #: RMS of the height error; null without one.
+    vertical_inside95_share: float | None = None  #: Share of the height errors inside 95 % of their sigma.
+    smoothed_worst_m: float | None = None  #: Largest horizontal error of the smoothed solution.
+    forward_end_worst_m: float | None = None  #: Largest horizontal error of the forward filter at the end of an outage.
 
 
 @dataclass(frozen=True)
@@ -109,17 +109,17 @@ class HeadingHypothesis:
     ``below_best`` is its log-likelihood below that of the best.
     """
 
-    start_heading_deg: float
-    end_heading_deg: float
-    below_best: float
+    start_heading_deg: float  #: True heading at the start under it.
+    end_heading_deg: float  #: True heading at the end under it.
+    below_best: float  #: Log-likelihood below that of the best hypothesis.
 
 
 @dataclass(frozen=True)
 class SeparationRow:
     """Difference of the forward filter from the smoothed solution in one quantity."""
 
-    quantity: Quantity
+    quantity: Quantity  #: Quantity compared.
     unit: str
-    rms: float
-    worst: float
-    worst_s: float
+    rms: float  #: RMS of the difference.
+    worst: float  #: Largest difference.
+    worst_s: float  #: Flight second of the largest.

@@ -22,9 +22,9 @@ class WrongSpan:
 
     start_s: float
     end_s: float
-    value: float
-    half95: float
-    largest: float
+    value: float  #: Median error in it, filter minus solution, constant taken off.
+    half95: float  #: Half of the 95 % interval of the median.
+    largest: float  #: Largest error in it.
 
     def over(self, quantity: Quantity) -> float:
         """Return what is sure of the error, over the one that a report opens with."""
@@ -39,9 +39,9 @@ class ChangeOfConstant:
     tell which. Of a vector ``by`` is the length.
     """
 
-    at_s: float
-    by: float
-    half95: float
+    at_s: float  #: Flight second of the change.
+    by: float  #: Constant after less constant before; of a vector the length.
+    half95: float  #: Half of the 95 % interval of the change.
 
     def over(self, quantity: Quantity) -> float:
         """Return what is sure of it, over the error that a report opens with."""
@@ -80,11 +80,11 @@ class OnboardError(Brief):
         not known.
     """
 
-    quantity: Quantity
+    quantity: Quantity  #: Quantity compared.
     unit: str
-    samples: int
-    offset: float | None
-    offset_sigma: float | None
+    samples: int  #: Outputs of the filter compared.
+    offset: float | None  #: Constant difference over the log, taken off; null where none was looked for.
+    offset_sigma: float | None  #: Standard deviation of the constant.
     offset_cause: OffsetCause
     offset_words: str
     rms: float
@@ -122,13 +122,14 @@ class OnboardErrors(Brief):
         The aircraft was flown by it; None where the log does not tell. ``flew_source`` is the parameter that does.
     """
 
-    topic: str
-    rows: tuple[OnboardError, ...]
+    topic: str  #: Topic of the filter: ins, or those of its lane.
+    rows: tuple[OnboardError, ...]  #: Its error in every quantity.
+    #: How much later its stamps are than those of the inertial unit, taken off; null where not known.
     delay_s: float | None = None
-    delay_sigma_s: float | None = None
+    delay_sigma_s: float | None = None  #: Standard deviation of that delay.
     name: str = ""
     flew: bool | None = None
-    flew_source: str = ""
+    flew_source: str = ""  #: Parameter that tells whether it flew.
 
     @property
     def title(self) -> str:

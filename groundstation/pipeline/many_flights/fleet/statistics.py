@@ -16,7 +16,7 @@ from groundstation.methods.fleet.density import densities_of
 from groundstation.methods.fleet.deviation import deviations
 from groundstation.methods.fleet.installations import installation_flights, installation_rows
 from groundstation.methods.fleet.moments import Moments
-from groundstation.methods.fleet.skill import SkillMerger
+from groundstation.methods.fleet.skill import SkillMergers
 from groundstation.methods.fleet.trends import trends
 from groundstation.methods.fleet.units import FlownUnit, UnitHistories, histories_of
 from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS
@@ -168,7 +168,7 @@ def _results(found: Scan, flights: FigureData, shares: Any, unread: list[NotInFl
     cells = _parts(found, shares, ("sample_cell", "sample_count"))
     histograms = compress(chain.from_iterable(map(histograms_of, cells)), is_sampled.tolist())
     trend = trends(flights, settings, limits_in(found.out)[0])
-    merger, skill_flights, checks = _details(found, flights, shares)
+    mergers, skill_flights, checks = _details(found, flights, shares)
     units = _units(found, flights, shares)
     read = installations_in(found.out)
     installations = () if read is None else read.installations
@@ -186,7 +186,8 @@ def _results(found: Scan, flights: FigureData, shares: Any, unread: list[NotInFl
         trend=trend.charts,
         change_points=trend.changes,
         slopes=trend.slopes,
-        skill=merger.rows(),
+        skill=mergers.whole.rows(),
+        skill_by_aircraft=mergers.by_aircraft(),
         skill_flights=skill_flights,
         calibration=answer.calibrations(checks),
         calibration_checks=checks,
@@ -224,14 +225,14 @@ def _units(found: Scan, flights: FigureData, shares: Any) -> UnitHistories:
     return histories_of(flown, limits_in(found.out)[0])
 
 
-def _details(found: Scan, flights: FigureData, shares: Any) -> tuple[SkillMerger, FleetSkillFlights, FleetChecks]:
+def _details(found: Scan, flights: FigureData, shares: Any) -> tuple[SkillMergers, FleetSkillFlights, FleetChecks]:
     """Skill merged over the flights, the rows of each flight's shipped method, all checks."""
-    merger, first = SkillMerger(), 0
+    mergers, first = SkillMergers(), 0
     skill: list[dict[str, NDArray[Any]]] = []
     checks: list[dict[str, NDArray[Any]]] = []
     for part in _parts(found, shares, ("shipped", "skill", "checks")):
         rows, columns = skill_rows_of(part)
-        merger.add_columns(columns)
+        mergers.add_columns(columns, flights["aircraft"][first + rows])
         is_shipped = columns["is_shipped"]
         told = {name: values[is_shipped] for name, values in columns.items() if name in SKILL_COLUMNS}
         skill.append(told | {"row": first + rows[is_shipped]})
@@ -239,7 +240,7 @@ def _details(found: Scan, flights: FigureData, shares: Any) -> tuple[SkillMerger
         checks.append(columns | {"row": first + rows})
         first += len(part)
     return (
-        merger,
+        mergers,
         FleetSkillFlights.of(_table("skill_flights", SKILL_COLUMNS, flights, skill)),
         FleetChecks.of(_table("calibration_checks", CHECK_COLUMNS, flights, checks)),
     )

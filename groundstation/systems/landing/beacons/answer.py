@@ -14,10 +14,10 @@ from groundstation.results.figures import FigureData
 class BeaconRow:
     """Beacon: its place, and how many bearings of it were used."""
 
-    name: str
-    before_threshold_m: float
-    right_m: float
-    bearings: int
+    name: str  #: Beacon as the site file names it.
+    before_threshold_m: float  #: Place before the threshold.
+    right_m: float  #: Place right of the course.
+    bearings: int  #: Bearings used.
 
 
 @dataclass(frozen=True)
@@ -44,16 +44,16 @@ class BeaconApproachRow:
         file.
     """
 
-    approach: int
-    start_s: float
-    end_s: float
-    first_before_threshold_m: float
-    last_before_threshold_m: float
-    fixes: int
-    blind: int
+    approach: int  #: Number of the approach, from 1.
+    start_s: float  #: Flight second of its beginning.
+    end_s: float  #: Flight second of its end.
+    first_before_threshold_m: float  #: Distance before the threshold found at its start.
+    last_before_threshold_m: float  #: Distance before the threshold found at its end.
+    fixes: int  #: Places found.
+    blind: int  #: Epochs without a place.
     speed_mps: float
-    ground_speed_mps: float | None
-    heading_difference_deg: float | None
+    ground_speed_mps: float | None  #: Ground speed of the INS.
+    heading_difference_deg: float | None  #: Heading by the bearings minus that of the INS.
     terrain_m: float | None
 
 
@@ -73,15 +73,15 @@ class DeviationRow:
         The most demanding one whose accuracy that meets; empty: none.
     """
 
-    approach: int
-    before_threshold_m: float
-    distance_95_m: float
-    lateral_m: float
-    lateral_95_m: float
-    glide_path_m: float | None
-    glide_path_95_m: float | None
-    lateral_category: str
-    vertical_category: str
+    approach: int  #: Number of the approach, from 1.
+    before_threshold_m: float  #: Distance before the threshold.
+    distance_95_m: float  #: 95 % of the error of the distance.
+    lateral_m: float  #: Right of the course.
+    lateral_95_m: float  #: 95 % of the error of lateral_m.
+    glide_path_m: float | None  #: Above the glide path; null over ground that is not known.
+    glide_path_95_m: float | None  #: 95 % of the error of glide_path_m.
+    lateral_category: str  #: Most demanding category whose lateral accuracy is met; empty: none.
+    vertical_category: str  #: Most demanding category whose vertical accuracy is met; empty: none.
 
 
 @dataclass(frozen=True)
@@ -105,12 +105,12 @@ class BeaconLanding(Answer):
 
     analysis: ClassVar[str] = "landing_beacons"
 
-    runway: str
-    bearing_sigma_deg: float
-    height_sigma_m: float
-    beacons: tuple[BeaconRow, ...]
-    approaches: tuple[BeaconApproachRow, ...]
-    rows: tuple[DeviationRow, ...]
+    runway: str  #: Runway that the distances are of.
+    bearing_sigma_deg: float  #: Error of a bearing that the figures assume.
+    height_sigma_m: float  #: Error of the radio altitude that the figures assume.
+    beacons: tuple[BeaconRow, ...]  #: Every beacon, and what was used of it.
+    approaches: tuple[BeaconApproachRow, ...]  #: Every approach.
+    rows: tuple[DeviationRow, ...]  #: Deviations by distance.
     remarks: tuple[str, ...] = ()
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()

@@ -18,11 +18,11 @@ HONEST, WHITE = "models_correlation", "takes_it_for_white"  # filters of the tri
 class ReferencePointRow:
     """One reference point; a moving one at the start of the approach."""
 
-    name: str
-    is_moving: bool
-    before_threshold_m: float
-    right_m: float
-    up_m: float
+    name: str  #: Point as the scenario names it.
+    is_moving: bool  #: Whether it moves.
+    before_threshold_m: float  #: Place before the threshold.
+    right_m: float  #: Place right of the course.
+    up_m: float  #: Place above the threshold.
 
 
 @dataclass(frozen=True)
@@ -46,18 +46,18 @@ class AccuracyRow:
         The same of one axis alone.
     """
 
-    place: str
-    before_threshold_m: float
-    height_m: float
-    sigma_along_m: float
-    sigma_right_m: float
-    sigma_up_m: float
-    lateral_95_m: float
+    place: str  #: Name of the place.
+    before_threshold_m: float  #: Distance before the threshold, negative behind it.
+    height_m: float  #: Height above the threshold.
+    sigma_along_m: float  #: One sigma along the course.
+    sigma_right_m: float  #: One sigma across the course.
+    sigma_up_m: float  #: One sigma of height.
+    lateral_95_m: float  #: 1.96 sigma across the course.
     horizontal_95_m: float
-    vertical_95_m: float
+    vertical_95_m: float  #: 1.96 sigma of height.
     category: str
-    lateral_category: str
-    vertical_category: str
+    lateral_category: str  #: Most demanding category whose lateral accuracy is met; empty: none.
+    vertical_category: str  #: Most demanding category whose vertical accuracy is met; empty: none.
 
 
 @dataclass(frozen=True)
@@ -67,10 +67,10 @@ class CategorySpan:
     It is met in all, or along one axis alone.
     """
 
-    category: str
-    axis: str
-    from_before_threshold_m: float
-    to_before_threshold_m: float
+    category: str  #: Name of the category.
+    axis: str  #: lateral or vertical where one axis alone is meant.
+    from_before_threshold_m: float  #: Distance before the threshold where it begins.
+    to_before_threshold_m: float  #: Distance before the threshold where it ends.
 
 
 @dataclass(frozen=True)
@@ -92,15 +92,15 @@ class TrialRow:
     """
 
     filter: str
-    before_threshold_m: float
-    nees: float
-    nees_low: float
-    nees_high: float
-    rms_along_m: float
-    rms_right_m: float
-    rms_up_m: float
-    overconfidence_right: float
-    overconfidence_up: float
+    before_threshold_m: float  #: Distance before the threshold.
+    nees: float  #: Mean normalised squared error of the place; 3 is honest.
+    nees_low: float  #: Lower 95 % limit of NEES by the trials.
+    nees_high: float  #: Upper 95 % limit of NEES by the trials.
+    rms_along_m: float  #: RMS error along the course.
+    rms_right_m: float  #: RMS error across the course.
+    rms_up_m: float  #: RMS error of height.
+    overconfidence_right: float  #: RMS error over computed sigma across the course; 1 is honest.
+    overconfidence_up: float  #: RMS error over computed sigma of height; 1 is honest.
     is_consistent: bool
 
 
@@ -125,15 +125,15 @@ class RangeLanding(PlanAnswer):
 
     analysis: ClassVar[str] = "landing_ranges"
 
-    title: str
-    points: tuple[ReferencePointRow, ...]
-    rows: tuple[AccuracyRow, ...]
-    spans: tuple[CategorySpan, ...]
-    least_along_m: float
-    least_right_m: float
-    least_up_m: float
-    trials: tuple[TrialRow, ...] = ()
-    trial_count: int = 0
+    title: str  #: Name of the scenario.
+    points: tuple[ReferencePointRow, ...]  #: Reference points.
+    rows: tuple[AccuracyRow, ...]  #: Accuracy at places that matter.
+    spans: tuple[CategorySpan, ...]  #: Stretches where a category's accuracy is met.
+    least_along_m: float  #: Least sigma along the course anywhere on the path.
+    least_right_m: float  #: Least sigma across the course anywhere on the path.
+    least_up_m: float  #: Least sigma of height anywhere on the path.
+    trials: tuple[TrialRow, ...] = ()  #: Simulated approaches against the computed sigmas.
+    trial_count: int = 0  #: Number of simulated approaches.
     remarks: tuple[str, ...] = ()
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()

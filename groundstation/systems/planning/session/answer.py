@@ -45,23 +45,23 @@ class LawRow:
 
     law: str
     horizon: Horizon
-    two_sigma_north_m: float
-    two_sigma_east_m: float
-    two_sigma_up_m: float
-    two_sigma_r_m: float
-    determinant: float
-    eigenvalue: float
-    dop: float
+    two_sigma_north_m: float  #: Twice the sigma north at the end.
+    two_sigma_east_m: float  #: Twice the sigma east at the end.
+    two_sigma_up_m: float  #: Twice the sigma of height at the end.
+    two_sigma_r_m: float  #: Twice the root of the summed variances north and east at the end.
+    determinant: float  #: det(H'H) at the end.
+    eigenvalue: float  #: Least eigenvalue of H'H at the end.
+    dop: float  #: Dilution of precision at the end; null where the sources do not tell.
     gram_determinant: float
-    dop_worst: float
-    least_range_m: float
-    least_separation_m: float | None
+    dop_worst: float  #: Greatest dilution of precision of the interval.
+    least_range_m: float  #: Least distance to any source.
+    least_separation_m: float | None  #: Least distance between any two aircraft.
     bounded_share: float
     gap: float
     has_converged: bool
-    iterations: int
-    evaluations: int
-    starts: int
+    iterations: int  #: Steps of the optimiser.
+    evaluations: int  #: Flights that the optimiser computed.
+    starts: int  #: First guesses that it began from.
     start_spread: float
 
 
@@ -69,14 +69,14 @@ class LawRow:
 class ControlRow:
     """One control of one aircraft: bounds, and value at the end under the recommended law."""
 
-    aircraft: str
-    control: str
-    unit: str
-    start: float
-    low: float
-    high: float
-    most_change_per_s: float
-    end: float
+    aircraft: str  #: Name of the aircraft.
+    control: str  #: What is controlled.
+    unit: str  #: Unit of the values.
+    start: float  #: Value at the start.
+    low: float  #: Least value allowed.
+    high: float  #: Greatest value allowed.
+    most_change_per_s: float  #: Greatest change a second.
+    end: float  #: Value at the end under the recommended law.
 
 
 @dataclass(frozen=True)
@@ -109,12 +109,12 @@ class ControlPlan(PlanAnswer):
     judged: str
     recommended: str
     gain: float
-    laws: tuple[LawRow, ...]
-    controls: tuple[ControlRow, ...] = ()
-    aircraft: tuple[str, ...] = ()
-    points: tuple[str, ...] = ()
+    laws: tuple[LawRow, ...]  #: Every law of control, and its result.
+    controls: tuple[ControlRow, ...] = ()  #: Controls under the recommended law.
+    aircraft: tuple[str, ...] = ()  #: Names of the aircraft.
+    points: tuple[str, ...] = ()  #: Names of the ground points.
     exact: tuple[str, ...] = ()
-    duration_s: float = 0.0
+    duration_s: float = 0.0  #: Length of the plan.
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
 

@@ -36,24 +36,24 @@ class DesignRow:
     """
 
     design: str
-    determinant: float
-    eigenvalue: float
-    dop: float
-    two_sigma_north_m: float
-    two_sigma_east_m: float
-    two_sigma_up_m: float
-    worst_two_sigma_north_m: float
-    worst_two_sigma_east_m: float
-    worst_two_sigma_up_m: float
+    determinant: float  #: det(H'H) at the fixed point.
+    eigenvalue: float  #: Least eigenvalue of H'H at the fixed point.
+    dop: float  #: Dilution of precision at the fixed point.
+    two_sigma_north_m: float  #: Twice the sigma north at the fixed point.
+    two_sigma_east_m: float  #: Twice the sigma east at the fixed point.
+    two_sigma_up_m: float  #: Twice the sigma of height at the fixed point.
+    worst_two_sigma_north_m: float  #: Largest on the way that counts, north.
+    worst_two_sigma_east_m: float  #: Largest on the way that counts, east.
+    worst_two_sigma_up_m: float  #: Largest on the way that counts, height.
     lost: str
-    lost_two_sigma_north_m: float | None
-    lost_two_sigma_east_m: float | None
-    lost_two_sigma_up_m: float | None
+    lost_two_sigma_north_m: float | None  #: At the fixed point without the point whose loss costs most, north.
+    lost_two_sigma_east_m: float | None  #: At the fixed point without the point whose loss costs most, east.
+    lost_two_sigma_up_m: float | None  #: At the fixed point without the point whose loss costs most, height.
     gap: float
-    has_converged: bool
-    iterations: int
-    evaluations: int
-    starts: int
+    has_converged: bool  #: Whether the optimiser came to an end.
+    iterations: int  #: Steps of the optimiser.
+    evaluations: int  #: Sets of places that the optimiser tried.
+    starts: int  #: First guesses that it began from.
     start_spread: float
 
 
@@ -65,14 +65,14 @@ class PlaceRow:
     stands, None where the way does not lead over it.
     """
 
-    design: str
-    point: str
-    north_m: float
-    east_m: float
-    height_m: float
-    is_placed: bool
-    keep_out_distance_m: float | None
-    below_way_m: float | None
+    design: str  #: Name of the design.
+    point: str  #: Name of the ground point.
+    north_m: float  #: Place, north.
+    east_m: float  #: Place, east.
+    height_m: float  #: Place, height.
+    is_placed: bool  #: Whether the plan may place it.
+    keep_out_distance_m: float | None  #: To the nearest edge of what is kept out.
+    below_way_m: float | None  #: How far below the way it stands; null where the way does not lead over it.
 
 
 @dataclass(frozen=True)
@@ -103,14 +103,14 @@ class PlacementPlan(PlanAnswer):
     analysis: ClassVar[str] = "placement"
     judged: str
     recommended: str
-    fixed_at_s: float
-    fixed_north_m: float
-    fixed_east_m: float
-    fixed_height_m: float
-    from_s: float
-    to_s: float
-    designs: tuple[DesignRow, ...]
-    places: tuple[PlaceRow, ...] = ()
+    fixed_at_s: float  #: Second of the plan at the fixed point.
+    fixed_north_m: float  #: Fixed point, north.
+    fixed_east_m: float  #: Fixed point, east.
+    fixed_height_m: float  #: Fixed point, height.
+    from_s: float  #: Second at which the part of the way that counts begins.
+    to_s: float  #: Second at which it ends.
+    designs: tuple[DesignRow, ...]  #: Every set of places, and its accuracy.
+    places: tuple[PlaceRow, ...] = ()  #: Every point in every design.
     moved: str = ""
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
