@@ -8,6 +8,7 @@ from groundstation.chapters import gates
 from groundstation.chapters.grades import MEANINGS, legend, meaning_of
 from groundstation.chapters.markdown import front_markdown
 from groundstation.chapters.parts import Claim, Document, Mark, Rank
+from groundstation.cli.lines import GRADES
 from groundstation.reports.flight_report import flight_report_html
 from groundstation.systems.health.answer import HEADLINES
 from groundstation.systems.inertial.units_chapter import CLAIMS
@@ -25,15 +26,35 @@ IN_TABLES = {  # words of cells, explained by the tables that they stand in
 }
 
 
+COLOURS = {"good": {"green"}, "bad": {"red"}, "warn": {"yellow", "red"}, "unknown": {"yellow"}, "plain": set[str]()}
+
+
 def words_of_marks() -> dict[str, str]:
     """Words of marks that begin with a capital, with the file: those of claims, and some of cells."""
+    return {mark.text: file for mark, file in marks().items()}
+
+
+def marks() -> dict[Mark, str]:
+    """Marks of constant words that begin with a capital, with their file."""
     found = {}
     for path in sorted((*(PACKAGE / "systems").rglob("*.py"), *(PACKAGE / "chapters").glob("*.py"))):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Mark":
                 texts = [one.value for part in node.args[1:] for one in ast.walk(part) if isinstance(one, ast.Constant)]
-                found |= {text: path.name for text in texts if isinstance(text, str) and text[:1].isupper()}
+                tone = node.args[0].value if isinstance(node.args[0], ast.Constant) else "plain"
+                found |= {Mark(tone, text): path.name for text in texts if isinstance(text, str) and text[:1].isupper()}  # type: ignore[arg-type]
     return found
+
+
+def test_a_word_has_the_colour_of_its_tone_on_the_terminal() -> None:
+    """Yellow of what is open, or none; never the colour of another word that it begins with."""
+    wrong = {}
+    for mark in (*marks(), *gates.VERDICTS.values(), *CLAIMS.values()):
+        phrase = f"{mark.text[:1].lower()}{mark.text[1:]}"
+        colour = GRADES.get(phrase, GRADES.get(phrase.partition(" ")[0]))
+        if mark.text in MEANINGS and mark.tone != "plain" and colour is not None and colour not in COLOURS[mark.tone]:
+            wrong[mark.text] = (mark.tone, colour)
+    assert not wrong
 
 
 def test_every_word_that_grades_an_answer_has_a_meaning() -> None:

@@ -18,6 +18,7 @@ GRADES: Mapping[str, str] = {
     **dict.fromkeys(("reject", "refused", "fail", "failed", "bad", "wrong", "off", "not", "left GNSS"), "red"),
     **dict.fromkeys(("data lost", "moved while aligning"), "red"),
     **dict.fromkeys(("doubtful", "undecided", "ambiguous", "warn", "warnings", "filter wrong"), "yellow"),
+    **dict.fromkeys(("no rate", "not judged", "not logged", "not measured", "joined roughly"), "yellow"),
     **dict.fromkeys(("advisory", "extend", "too sure", "not stabilised", "they differ", "it or another"), "yellow"),
 }
 _BESIDE = re.compile(r" \([^()]*\)")

@@ -73,11 +73,7 @@ def sentence(answers: Answers) -> str:
 def _drift(inertial: InertialResult) -> str:
     rate = inertial.radial_error_rate_fit_nmiph
     if rate is not None:
-        start = inertial.navigation_start
-        stated = (
-            f" since the start as stated ({start.reason})" if start is not None and is_start_stated(inertial) else ""
-        )
-        return f"INS {rate:.2f} nmi/h{stated}"
+        return f"INS {rate:.2f} nmi/h{_stated(inertial)}"
     if not is_start_unknown(inertial):
         return ""
     growth, state = growth_nmiph(inertial), " (state nav_start_utc)"
@@ -85,6 +81,15 @@ def _drift(inertial: InertialResult) -> str:
         return f"no rate: start of navigation not known{state}"
     verb = "grew" if growth >= 0.0 else "fell"
     return f"no rate: INS error {verb} {abs(growth):.2f} nmi/h in log{state}"
+
+
+def _stated(inertial: InertialResult) -> str:
+    """Return since when the rate counts, where somebody stated it."""
+    start = inertial.navigation_start
+    if start is None or not is_start_stated(inertial):
+        return ""
+    who, _, when = start.reason.rpartition(" says ")
+    return f" since {when} as stated" + (f" ({who})" if who else "")
 
 
 def _largest(inertial: InertialResult) -> str:

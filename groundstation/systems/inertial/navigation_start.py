@@ -27,6 +27,7 @@ STAND_MPS = 0.5  # mean velocity of GNSS below which the aircraft stands
 INS_STAND_MPS = 3.0  # the INS's own: its error may be in it
 STAND_M = 20.0  # what the INS's position may jump while it stands
 MEAN_EPOCHS = 5
+LATER_S = 600.0  # after its start an INS is no longer within the noise of GNSS
 LONGEST_WAIT_S = 300.0  # for GNSS, over which a velocity error is taken for constant
 CALM_MPS = 0.3  # an INS that was just aligned has hardly a velocity error
 SIGMAS = 3.0
@@ -82,7 +83,9 @@ def navigation_start(
     """
     began_s = np.array(mode_spans(flight, compared.ins_topic).ended_s, dtype=np.float64)
     found, findings = _by_statement(flight, compared, stated)
-    if found is None:
+    if found is not None:
+        findings = (*findings, *_set_later(compared, gnss, found))
+    else:
         found = _by_standstill(compared, gnss)
         if len(began_s) and (found.time_s is None or began_s[0] <= found.time_s + STAND_S):
             found = NavigationStart(float(began_s[0]), "mode", "its mode changes from align to navigation")
@@ -117,6 +120,30 @@ def _by_statement(
     return NavigationStart(start_s, "stated", f"{stated.by} says {stated.utc}"), ()
 
 
+def _set_later(compared: InsDifferences, gnss: GnssNoise, stated: NavigationStart) -> tuple[Finding, ...]:
+    """Warn where INS and GNSS agree at the begin of a log that is long after the stated start.
+
+    An INS that has navigated for so long is not within the noise of GNSS: its position was set in between.
+    """
+    both = np.flatnonzero(np.isfinite(compared.epochs.position_m).all(axis=1))
+    if not len(both) or stated.time_s is None:
+        return ()
+    after_s = float(compared.epochs.time_s[both[0]]) - stated.time_s
+    apart_m = float(np.hypot(*compared.epochs.position_m[both[0]]))
+    if after_s < LATER_S or apart_m > _limit_m(gnss):
+        return ()
+    text = (
+        f"INS and GNSS are {apart_m:.0f} m apart {after_s / 60.0:.0f} min after the stated start of navigation: if the "
+        "position of the INS was set in between, its rate counts from there and is larger than told"
+    )
+    return (Finding("warn", "inertial.nav_start", text, compared.ins_topic),)
+
+
+def _limit_m(gnss: GnssNoise) -> float:
+    """Return the distance by which INS and GNSS may differ by the noise of GNSS alone."""
+    return SIGMAS * float(np.hypot(gnss.position_white_m, gnss.position_correlated_m))
+
+
 def _by_standstill(compared: InsDifferences, gnss: GnssNoise) -> NavigationStart:
     """Return the first standstill at which INS and GNSS agree, or what speaks against it.
 
@@ -128,7 +155,7 @@ def _by_standstill(compared: InsDifferences, gnss: GnssNoise) -> NavigationStart
         return _unproven("no GNSS position beside the INS")
     seen_s = float(epochs.time_s[both[0]])
     still_s = _moves_from_s(compared, seen_s + STAND_S)
-    limit_m = SIGMAS * float(np.hypot(gnss.position_white_m, gnss.position_correlated_m))
+    limit_m = _limit_m(gnss)
     if still_s - seen_s < LEAST_STAND_S:
         first_m = float(np.hypot(*epochs.position_m[both[0]]))
         is_set = f", {first_m:.0f} m apart, as after its position was set to GNSS" if first_m <= limit_m else ""

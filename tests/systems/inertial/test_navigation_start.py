@@ -191,7 +191,11 @@ def test_an_error_that_begins_at_zero_in_flight_is_told_as_set_there() -> None:
     flight = begun_at(flight_from_stand(), 900.0)
     both = [{name: flight[kind].columns[name].values for name in PLACE} for kind in ("ins", "gnss")]
     apart = {name: both[0][name] - (both[0][name][0] - both[1][name][0]) for name in PLACE}
-    start = result(changed(flight, "ins", **apart)).navigation_start
+    moved = changed(flight, "ins", **apart)
+    told = [one.text for one in estimate(moved, utc_ns_to_iso(START_NS)).findings if one.code == "inertial.nav_start"]
+    assert len(told) == 1 and told[0].startswith("INS and GNSS are 0 m apart 15 min after the stated start")
+    assert not [one for one in estimate(flight, utc_ns_to_iso(START_NS)).findings if one.code == "inertial.nav_start"]
+    start = result(moved).navigation_start
     assert start is not None and start.time_s is None
     assert start.reason.endswith(" m apart, as after its position was set to GNSS")
 
@@ -200,8 +204,8 @@ def test_a_stated_start_stands_on_the_line_and_the_page() -> None:
     found = result(begun_at(flight_from_stand(), 900.0), utc_ns_to_iso(START_NS))
     line = INERTIAL.sentence(by_analysis(found))
     start = utc_ns_to_iso(START_NS)
-    rate = f"INS {found.radial_error_rate_fit_nmiph:.2f} nmi/h since the start as stated"
-    assert line.startswith(f"{rate} (the aircraft file says {start}), max ")
+    rate = f"INS {found.radial_error_rate_fit_nmiph:.2f} nmi/h since {start} as stated"
+    assert line.startswith(f"{rate} (the aircraft file), max ")
     claim = chapter.inertial_claim(found, "", is_doubtful=False)
     assert (claim.mark.text, claim.figures[0][0]) == ("Measured", "INS drift")
     assert f"stated: the aircraft file says {start}" in claim.figures[0][2].replace("\u202f", " ")
