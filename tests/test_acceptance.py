@@ -175,6 +175,7 @@ def test_a_page_says_how_many_flights_a_claim_takes_and_how_many_are_short(
     top = front(found)
     assert "claim on 95% of flights at 95% confidence takes" in top.headline
     assert said.partition(" if none")[0] in top.headline and said in " ".join(top.sentences)
+    assert f"over, the largest {max(rates):g}\u202fnmi/h, wanted" in " ".join(top.sentences)
     (grid,) = (
         part for section in sections(found) for part in section.parts if getattr(part, "title", "") == "All flights"
     )

@@ -1,5 +1,7 @@
 """TOML text of a user's file: bounded in size and depth, refused with one line."""
 
+import re
+from datetime import date, time
 from pathlib import Path
 from typing import Any
 
@@ -34,21 +36,37 @@ def toml_text(path: Path, where: str, expected: str = "a TOML file", next_step: 
 
 
 def toml_table(text: str, where: str, expected: str = "a TOML file", next_step: str = "") -> dict[str, Any]:
-    """Return the table that a TOML text holds.
+    """Return the table that a TOML text holds, its dates as text: they need no quotes.
 
     Raises
     ------
     SettingsError
         When it is not TOML, or nested too deeply.
+
+    Examples
+    --------
+    >>> toml_table("starts = [2014-06-01T20:01:12Z, 2014-06-01, 3]", "a.toml")
+    {'starts': ['2014-06-01T20:01:12Z', '2014-06-01', 3]}
     """
     import tomllib  # 10 ms that most commands do not need
 
     try:
-        return tomllib.loads(text)
+        table: dict[str, Any] = _with_dates_as_text(tomllib.loads(text))
+        return table
     except tomllib.TOMLDecodeError as error:
         raise SettingsError(where, f"not TOML ({error})", expected, next_step) from error
     except RecursionError as error:
         raise SettingsError(where, "not TOML (brackets in brackets, too many)", expected, next_step) from error
+
+
+def _with_dates_as_text(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _with_dates_as_text(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_with_dates_as_text(one) for one in value]
+    if isinstance(value, date | time):  # a datetime is a date
+        return re.sub(r"\+00:00$", "Z", value.isoformat())
+    return value
 
 
 def quoted(text: str) -> str:

@@ -16,7 +16,7 @@ CLAIMS = {
         "independent flights."
     ),
     "units": "The claim is on all INS of the kind flown. Each INS counts at most once, however often it flew.",
-    "these": "The claim is on the INS flown alone. Each of their flights counts; it takes no fewer of them.",
+    "these": "The claim is on the INS flown alone. Each of their flights counts; as many are needed as for a kind.",
 }
 ROLES = ("Prepared", "Checked", "Approved")
 NOT_MEASURED = "Acceleration, roll, pitch and attitude rate are not judged: the logs hold no reference for them."

@@ -80,7 +80,10 @@ def _told(found: Acceptance, one: Judgement) -> str:
     if not one.flights:
         told = f"{clean(limit.title)}: measured on none of {number(one.not_measured, 0)} flights, {asked}."
         return f"{told} {_missing(found, one)}".strip()
-    flown = f"{number(one.over, 0)} of {number(one.flights, 0)} flights of {number(one.ins_units, 0)} INS over"
+    flown = (
+        f"{number(one.over, 0)} of {number(one.flights, 0)} flights of {number(one.ins_units, 0)} INS over"
+        f"{_largest(found, limit)}"
+    )
     worth = f" (worth {number(one.effective_flights, 1)} independent flights)" if is_worth_less(one) else ""
     told = (
         f"{clean(limit.title)}: {flown}, {asked}. At "
@@ -89,6 +92,16 @@ def _told(found: Acceptance, one: Judgement) -> str:
     if one.not_measured:
         told += f" {number(one.not_measured, 0)} more not judged: the limited quantity was not measured."
     return f"{told} {_missing(found, one)}".strip()
+
+
+def _largest(found: Acceptance, limit: AcceptanceLimit) -> str:
+    """Return the largest figure of the flights, of a limit with one bound; empty of several."""
+    values = [flight.values for flight in found.included if limit.is_for(flight.hours)]
+    if len(limit.bounds) != 1:
+        return ""
+    (bound,) = limit.bounds
+    sizes = [abs(one[bound.quantity]) for one in values if bound.quantity in one]
+    return f", the largest {_of_bound(bound, max(sizes))}" if sizes else ""
 
 
 def stated(share: float) -> str:

@@ -11,9 +11,11 @@ from typer.testing import CliRunner
 import groundstation
 from groundstation.base.errors import SettingsError
 from groundstation.base.timescales import utc_ns_to_iso
+from groundstation.base.toml_settings import settings_from
 from groundstation.base.units import NS_PER_S
 from groundstation.cli.lines import line_of
 from groundstation.cli.main import app
+from groundstation.pipeline.one_flight.configuration import read_toml
 from groundstation.pipeline.one_flight.flight import sentence
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.verbs.acceptance import accept
@@ -272,6 +274,13 @@ def test_one_ins_as_a_whole_and_from_the_middle(case: str, rate: float | None, t
     (summary,) = (tmp_path / "out").glob("*/summary.json")
     found = json.loads(summary.read_text())["results"]["inertial"]["radial_error_rate_50_nmiph"]
     assert found is None if rate is None else found == pytest.approx(rate, abs=0.006)
+
+
+def test_a_start_is_the_same_with_and_without_quotes(tmp_path: Path) -> None:
+    path = tmp_path / "aircraft.toml"
+    for written in ('"2014-06-01T20:01:12Z"', "2014-06-01T20:01:12Z", "2014-06-01 20:01:12Z"):
+        path.write_text(f"nav_start_utc = {written}\n")
+        assert settings_from(AircraftData, read_toml(path), str(path)).nav_start_utc == "2014-06-01T20:01:12Z"
 
 
 @pytest.mark.slow
