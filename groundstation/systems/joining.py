@@ -24,6 +24,10 @@ class NotOneFlightError(GroundstationError):
     """
 
 
+class NoCommonClockError(NotOneFlightError):
+    """Nothing tells the lag between two logs: UTC in both would."""
+
+
 class Timed(Protocol):
     """Log by its tables, and GNSS time where it tells it."""
 
