@@ -87,6 +87,8 @@ class OutageRow:
         Likewise of the height.
     smoothed_worst_m, forward_end_worst_m : float or None
         Largest of the outages.
+    standing_count, without_gnss_count : int
+        Outages of this length that were tried and left out: the vehicle mostly stood, or GNSS is not there.
     """
 
     length_s: float
@@ -100,6 +102,8 @@ class OutageRow:
     vertical_inside95_share: float | None = None
     smoothed_worst_m: float | None = None
     forward_end_worst_m: float | None = None
+    standing_count: int = 0
+    without_gnss_count: int = 0
 
 
 @dataclass(frozen=True)
