@@ -19,7 +19,10 @@ if TYPE_CHECKING:
 
 
 def show_checked(named: "NamedLogs", checked: "Sequence[CheckedLog]", *, quiet: bool) -> None:
-    """Print a line for each log, usability first where that was asked; failures with their reasons on stderr."""
+    """Print a line for each log, usability first where that was asked.
+
+    Failures go to stderr with their reasons.
+    """
     for one in checked:
         if one.outcome.state == "failed":
             tell_errors(one.outcome)

@@ -25,7 +25,10 @@ class NotOneFlightError(GroundstationError):
 
 
 class NoCommonClockError(NotOneFlightError):
-    """Nothing tells the lag between two logs: UTC in both would."""
+    """Two logs have nothing that tells the lag between them.
+
+    UTC in both would.
+    """
 
 
 class Timed(Protocol):

@@ -17,7 +17,10 @@ def with_next_step(error: NoCommonClockError, without_utc: Iterable[Log]) -> NoC
 
 
 def _utc_setting(log: Log) -> str:
-    """Return the file or the setting that gives a table UTC; empty for a log of another format."""
+    """Return the file or the setting that gives a table UTC.
+
+    Empty for a log of another format.
+    """
     name, reader = log.path.name, log.source.reader
     if reader.startswith(BY_PROFILE):
         profile = "a profile of your own" if log.profile is None else log.profile.name

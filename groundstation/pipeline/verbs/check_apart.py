@@ -26,7 +26,10 @@ DRAFT = "draft of an ICD"
 
 @dataclass(frozen=True)
 class CheckJob:
-    """Logs to look at in one process: several of a session, else one; ``is_alone``: no other was named beside it."""
+    """Logs to look at in one process: several of a session, else one.
+
+    ``is_alone``: no other was named beside it.
+    """
 
     paths: tuple[Path, ...]
     configuration: Configuration

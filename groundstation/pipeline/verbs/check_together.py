@@ -1,4 +1,7 @@
-"""Verb ``check --together``: logs of one flight, joined as ``run --together`` does, and checked as one."""
+"""Verb ``check --together``: logs of one flight checked as one.
+
+They are joined as ``run --together`` joins them.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace

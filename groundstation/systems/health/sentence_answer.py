@@ -90,9 +90,9 @@ def told(checks: Sequence[Check], loss: AttitudeLoss | None = None) -> str:
 
 
 def told_apart(checks: Sequence[Check], loss: AttitudeLoss | None = None) -> tuple[str, tuple[str, ...]]:
-    """Return what failed first, and when, and the rest of the sentence in parts: all that is bad, then what is good.
+    """Return what failed first, and when, and the rest of the sentence in parts.
 
-    Without a failure the first is what warns, else what is good.
+    The rest is all else that is bad, then what is good. Without a failure the first is what warns, else what is good.
     """
     bad = sorted((one for one in checks if one.is_bad), key=gravity)
     parts = [part for part in _by_time(bad, loss) if part]

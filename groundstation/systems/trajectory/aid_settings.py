@@ -1,4 +1,7 @@
-"""Settings of the aids beside GNSS: no sideways motion, barometer, wheels, magnetic heading."""
+"""Settings of the aids beside GNSS.
+
+No sideways motion, barometer, wheels, magnetic heading.
+"""
 
 from dataclasses import dataclass
 

@@ -92,7 +92,10 @@ def aided(
 
 
 def may_roll(vehicle: str | None, settings: AidSettings) -> bool:
-    """Tell whether no sideways motion is tried: of what rolls, unless the user switched it off."""
+    """Tell whether no sideways motion is tried.
+
+    It is of what rolls, unless the user switched it off.
+    """
     return vehicle == "rolls" and settings.use_no_sideways_motion
 
 

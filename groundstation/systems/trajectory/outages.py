@@ -81,7 +81,10 @@ class Outages:
         return np.asarray(self.length_s == length_s)
 
     def left_out(self, length_s: float, *, standing: bool) -> int:
-        """Return how many of a length were not replayed, for the vehicle stood or else for GNSS is not there."""
+        """Return how many outages of a length were not replayed.
+
+        The vehicle stood in them; else GNSS is not there.
+        """
         return int(np.count_nonzero((self.left_out_length_s == length_s) & (self.left_out_standing == standing)))
 
 
@@ -133,7 +136,10 @@ def _of_length(estimate: Estimate, length_s: float, left: list[tuple[float, floa
 
 
 def _why_not(estimate: Estimate, start_s: float, end_s: float) -> Literal["", "no GNSS", "stands"]:
-    """Return why an outage tells nothing: GNSS is not there in any case, or the vehicle hardly moves."""
+    """Return why an outage tells nothing; empty where it does.
+
+    GNSS is not there in any case, or the vehicle hardly moves.
+    """
     plan = estimate.result.plan
     inside = (plan.valid_s >= start_s) & (plan.valid_s < end_s)
     fixes = inside & (plan.seen.kind == POSITION)
