@@ -69,7 +69,7 @@ def _advice(results: FlightResults, chapters: Chapters) -> Iterator[Advice]:
     yield from (advice for advice in given if advice.is_danger)
     yield from (advice for advice in given if advice.is_pressing and not advice.is_danger)
     remedies = [*(remedy for one in chapters.advisers for remedy in one.remedies), *BY_REASON]
-    if not results.ledger.topics or topics_of_kind("ins", results.ledger.topics):
+    if not results.ledger.topics or topics_of_kind("ins", tuple(results.ledger.topics)):
         remedies += BY_REASON_OF_AN_INS
     for one in results.not_assessable:
         purpose = chapters.titles.get(one.analysis, one.analysis)

@@ -43,7 +43,12 @@ from groundstation.cli.completion import analyses
 @app.command(epilog=examples("info"))
 @answers_with_exit_code
 def info(
-    log: Annotated[Path, typer.Argument(help="A recorded log or an MCAP.", metavar="LOG", readable=False)],
+    log: Annotated[
+        Path,
+        typer.Argument(
+            help="A recorded log, an MCAP, or a folder of logs: a line each.", metavar="LOG", readable=False
+        ),
+    ],
     profile: Profile = None,
     icd: IcdFiles = None,
     suggest_icd: Annotated[
@@ -68,10 +73,20 @@ def info(
         tell(apart.suggest_icd_apart(log, bounds) if bounds is not None else describe.suggest_icd(log))
         return DONE
     icds = tuple(icd or ())
-    if bounds is not None:
-        description = apart.describe_apart(log, profile, icds, bounds)
-    else:
-        description = describe.describe(log, profile, icds)
+
+    def described(path: Path, *, is_alone: bool) -> describe.Description:
+        if bounds is not None:
+            return apart.describe_apart(path, profile, icds, bounds, is_alone=is_alone)
+        return describe.describe(path, profile, icds, is_alone=is_alone)
+
+    if log.is_dir():
+        from groundstation.cli.listing import describe_listed
+        from groundstation.pipeline.verbs.named_logs import logs_named
+
+        named = logs_named([log], profile)
+        if named.has_folder:
+            return describe_listed(named, partial(described, is_alone=False), as_json_text=json)
+    description = described(log, is_alone=True)
     shown = printing.as_json(description.to_dict()) if json else printing.description(description, everything=verbose)
     tell(shown)
     if not description.has_records:
@@ -83,7 +98,14 @@ def info(
 @app.command(epilog=examples("check"))
 @answers_with_exit_code
 def check(
-    logs: Annotated[list[Path], typer.Argument(help="Recorded logs or MCAPs.", metavar="LOG", readable=False)],
+    logs: Annotated[
+        list[Path],
+        typer.Argument(
+            help="Recorded logs or MCAPs. Of a folder each log is told in a line, in full with -v.",
+            metavar="LOG",
+            readable=False,
+        ),
+    ],
     purpose: Annotated[
         str,
         typer.Option(
@@ -101,6 +123,7 @@ def check(
     config: ConfigFile = None,
     profile: Profile = None,
     icd: IcdFiles = None,
+    together: Together = False,
     timeout: Timeout = None,
     isolate: Isolate = False,
     fail_on: FailOn = "none",
@@ -113,23 +136,37 @@ def check(
 
     Writes nothing.
 
-    With --for, the first line says whether the log can be used for that analysis.
+    With --for, the first line says whether the log can be used for that analysis; with --together, whether the logs of
+    one flight can, joined as `run --together` joins them.
     """
-    from groundstation.cli import check_table, printing
+    from groundstation.cli import check_table, listing, printing
     from groundstation.cli.progress import listener
     from groundstation.pipeline.one_flight.configuration import load_configuration
     from groundstation.pipeline.verbs.check import check_many
+    from groundstation.pipeline.verbs.named_logs import NamedLogs, logs_named
 
     configuration = load_configuration(config, aircraft, site, profile=profile, thresholds=thresholds, icds=icd)
     bounds = time_bound(timeout, configuration.isolation if isolate else None)
+    if together and bounds is not None:
+        raise UsageError("--together", "--timeout or --isolate", "--together without them")
+    named = NamedLogs(tuple(logs)) if together else logs_named(logs, configuration.profile_path)
     with listener("none" if quiet else progress) as listen:
         check_logs = check_many
-        if bounds is not None:
+        if together:
+            from groundstation.pipeline.verbs.check_together import check_together
+
+            check_logs = check_together
+        elif bounds is not None:
             from groundstation.pipeline.verbs.check_apart import check_apart
 
             check_logs = partial(check_apart, bounds=bounds)
-        checked = check_logs(logs, configuration, purpose=purpose, fail_on=fail_on, listen=listen)
-    check_table.show(checked, as_json_text=json, quiet=quiet, everything=verbose)
+        checked = check_logs(named.logs, configuration, purpose=purpose, fail_on=fail_on, listen=listen)
+    if named.has_folder and not (json or verbose):
+        listing.show_checked(named, checked, quiet=quiet)
+    else:
+        check_table.show(checked, as_json_text=json, quiet=quiet, everything=verbose)
+    if not quiet and len(checked) > 1 and all(one.usability and one.usability.state == "no" for one in checked):
+        say("logs of one flight are judged as one with --together")
     return printing.worst_code(tuple(one.outcome for one in checked))
 
 

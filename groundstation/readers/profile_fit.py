@@ -187,6 +187,10 @@ class Fit:
             return bool(self._time_form.fullmatch(times[-1]))
         return any(_TIMES["seconds"].fullmatch(cell) for cell in others)
 
+    def is_whole(self, line: str) -> bool:
+        """Tell whether a line is a row that has as many cells as are read."""
+        return cell_count(line, self.delimiter) == self._cell_count and self.is_row(line)
+
     def is_of_names(self, line: str) -> bool:
         """Tell whether a line has names or units: words for the columns of time, no number."""
         times, others = self._times(line.lstrip("#"))

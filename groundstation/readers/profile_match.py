@@ -137,7 +137,7 @@ def _without_header(profile: Profile, encoding: str, lines: Sequence[HeadLine]) 
         rows = tuple(line.text for line in lines[at : at + DAMAGED_HEAD_LINES] if line.text.strip())
         header = HeadLine(top.number, top.next_byte, "", ended=True)
         fit = replace(fit, header=header, above=tuple(lines[:at]), first_rows=rows)
-        if rows and 2 * sum(map(fit.is_row, rows)) >= len(rows):
+        if rows and 2 * sum(map(fit.is_whole, rows)) >= len(rows):
             return fit
     return None
 

@@ -24,6 +24,13 @@ class NotOneFlightError(GroundstationError):
     """
 
 
+class NoCommonClockError(NotOneFlightError):
+    """Two logs have nothing that tells the lag between them.
+
+    UTC in both would.
+    """
+
+
 class Timed(Protocol):
     """Log by its tables, and GNSS time where it tells it."""
 

@@ -28,7 +28,7 @@ from groundstation.tables.motion import (
 )
 from groundstation.tables.table import Flight
 from groundstation.tables.travel import travel_of
-from groundstation.tables.vehicle import Vehicle, VehicleKind, is_stated_to_roll, vehicle_of
+from groundstation.tables.vehicle import Vehicle, VehicleKind, is_rotorcraft, is_stated_to_roll, vehicle_of
 from groundstation.tables.wheels import LONGEST_HOLD_S, contact_of, disbelief, held
 
 Phase = Literal[
@@ -118,7 +118,7 @@ class Phases:
     likely : tuple of PhaseInterval
         The same with what is likely in place of ``unknown``: for people.
     vehicle : Vehicle
-        Kind of vehicle, which names the phases on the ground: taxi, driving, walking or under way.
+        Kind of vehicle, which names the phases on the ground: taxi, driving, walking, under way or on the ground.
     """
 
     intervals: tuple[PhaseInterval, ...]
@@ -180,7 +180,8 @@ def ground_mask(flight: Flight, time_ns: Int64Array, *, settings: GroundSettings
 def flight_phases(flight: Flight, *, settings: GroundSettings | None = None) -> Phases:
     """Divide a flight into standstill, taxi, take-off run, airborne, landing roll and unknown.
 
-    What rolls, walks or floats drives, walks or is under way in place of taxi. Standstill and taxi are proven ground
+    What rolls, walks or floats drives, walks or is under way in place of taxi; a multirotor or helicopter is on the
+    ground, and makes neither run nor roll. Standstill and taxi are proven ground
     (:func:`ground_mask`). Airborne is weight off wheels, or, by the detector, everything between lift-off and
     touch-down around sure flight, both read off the altitude. A take-off run is the stretch before lift-off that is
     faster than a quarter of the speed there, a landing roll the like after touch-down: these two may hold samples that
@@ -194,7 +195,7 @@ def flight_phases(flight: Flight, *, settings: GroundSettings | None = None) -> 
         travel = travel_of(flight, evidence.motion)
         contact = None if evidence.against_flag else evidence.contact
         vehicle = vehicle_of(flight, travel, contact, evidence.detection)
-        rolling = ON_GROUND.get(vehicle.kind, TAXI)
+        rolling = ON_GROUND.get(vehicle.kind, SOMEWHERE_ON_GROUND if is_rotorcraft(flight) else TAXI)
         proven = _labels(evidence, evidence.ground, evidence.airborne, evidence.motion.speed_mps, rolling)
         found = likely_of(
             travel, evidence.motion, vehicle.kind, (evidence.ground, evidence.airborne), evidence.detection
@@ -348,7 +349,7 @@ def _labels(
     flights = runs(label == AIRBORNE)
     gaps = zip([0, *(end for _, end in flights)], [*(start for start, _ in flights), len(label)], strict=True)
     for start, end in gaps:  # the parts between two flights, before the first and after the last
-        if end > start and ground[start:end].any():
+        if end > start and ground[start:end].any() and rolling != SOMEWHERE_ON_GROUND:
             _mark_runs(label, speed, start, end)
     return label
 

@@ -37,6 +37,7 @@ MAV_TYPES: dict[int, VehicleKind] = {
     12: "floats",
 }  # MAV_TYPE of MAVLink's common messages, which PX4 logs as vehicle_status.system_type
 TYPE_FIELDS = (("raw.vehicle_status", "system_type"), ("raw.HEARTBEAT", "type"))
+ROTORCRAFT = (2, 3, 4, 13, 14, 15, 29)  # MAV_TYPE: multirotors and helicopters; not one with wings too
 
 STANDS_MPS = 0.5  # receivers at rest show less
 WALKS_MPS = 2.5  # nobody walks faster
@@ -131,6 +132,14 @@ def _by_mav_type(flight: Flight) -> Vehicle | None:
                 number = int(numbers[np.argmax(counts)])
                 return Vehicle(MAV_TYPES[number], f"the autopilot's MAV_TYPE {number}", True)
     return None
+
+
+def is_rotorcraft(flight: Flight) -> bool:
+    """Tell whether the log says that it is of a multirotor or helicopter, which does not taxi."""
+    for topic, name in TYPE_FIELDS:
+        if topic in flight and flight[topic].has(name) and np.isin(flight[topic].values(name), ROTORCRAFT).any():
+            return True
+    return "copter" in f"{flight.metadata.get(VEHICLE, '')} {flight.metadata.get('firmware', '')}".lower()
 
 
 def _flown(travel: Travel, contact: Contact | None, detection: Detection) -> str:

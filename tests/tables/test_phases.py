@@ -396,6 +396,36 @@ def test_weight_on_wheels_logged_on_change_can_deny_but_not_prove() -> None:
     assert mask[truth.time_s < 30.0].all()
 
 
+@pytest.mark.parametrize(
+    ("firmware", "mav_type", "expected"),
+    [
+        ("ArduCopter", None, "on the ground"),
+        ("", 2.0, "on the ground"),
+        ("ArduPlane", None, "taxi"),
+        ("", 1.0, "taxi"),
+        ("", 22.0, "taxi"),
+        ("", None, "taxi"),
+    ],
+    ids=["ArduPilot copter", "PX4 quadrotor", "ArduPilot plane", "PX4 plane", "PX4 tiltrotor", "unknown"],
+)
+def test_a_rotorcraft_does_not_taxi_it_is_on_the_ground(firmware: str, mav_type: float | None, expected: str) -> None:
+    truth = light_aircraft()
+    plain = flight_of(truth, weight_on_wheels=truth.contact)
+    tables, time_ns = dict(plain.tables), plain["discrete"].time_ns[:2]
+    if mav_type is not None:
+        kind, rows = {"system_type": Column(np.full(2, mav_type))}, np.arange(2)
+        tables["raw.vehicle_status"] = Table("raw.vehicle_status", time_ns, kind, rows, Column(time_ns))
+    flight = Flight(tables, {"vehicle": firmware} if firmware else {}, plain.start_ns, True, "a.log")
+    found = flight_phases(flight)
+    names = {one.phase for one in found.likely}
+    assert expected in names and names.isdisjoint({"taxi", "on the ground"} - {expected})
+    assert ("take-off run" in names) == ("landing roll" in names) == (expected == "taxi")
+    ground = ("taxi", "on the ground", "take-off run", "landing roll", "standstill")
+    assert sum(found.seconds_in(one) for one in ground) == pytest.approx(
+        sum(flight_phases(plain).seconds_in(one) for one in ground)
+    )
+
+
 def test_landed_flag_of_an_autopilot_is_named() -> None:
     truth = light_aircraft()
     flight = flight_of(truth, weight_on_wheels=truth.contact)

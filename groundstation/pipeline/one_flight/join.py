@@ -26,6 +26,7 @@ from groundstation.pipeline.one_flight.continued import in_recordings, with_stra
 from groundstation.pipeline.one_flight.convert import Converted, census_of, convert_log, recounted
 from groundstation.pipeline.one_flight.flight import read_flight
 from groundstation.pipeline.one_flight.log import Log, as_log, open_one_of_several
+from groundstation.pipeline.one_flight.missing_utc import with_next_step
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.store.info import StoreInfo
 from groundstation.systems import systems
@@ -33,6 +34,7 @@ from groundstation.systems.joining import (
     FlightClock,
     JoinRecord,
     JoinStep,
+    NoCommonClockError,
     NotOneFlightError,
     PlacedLog,
     Timed,
@@ -170,7 +172,11 @@ def join_logs(
 def _related(part: _Part, clock_of: _Part, step: JoinStep, settings: Any) -> _Part:
     if part is clock_of:
         return part
-    return replace(part, relation=step.relate(clock_of.timed, part.timed, settings))
+    try:
+        return replace(part, relation=step.relate(clock_of.timed, part.timed, settings))
+    except NoCommonClockError as error:
+        without_utc = [one.log for one in (clock_of, part) if not one.timed.flight.has_utc]
+        raise with_next_step(error, without_utc) from error
 
 
 def _require_different(logs: Sequence[Log], left_out: int) -> None:

@@ -185,6 +185,18 @@ def open_one_of_several(path: Path, profile: Path | None = None, icds: tuple[str
         raise
 
 
+def is_claimed(path: Path, profile: Path | None = None) -> bool:
+    """Tell whether a reader, or the store, claims a file, by the profile or without it."""
+    from groundstation.readers.registry import identify
+
+    for one in dict.fromkeys((profile, None)):
+        with suppress(UnreadableLogError):
+            if not _is_store(as_log(path), one):
+                identify(as_log(path), one)
+            return True
+    return False
+
+
 def open_parts(paths: Sequence[Path], profile: Path | None = None, icds: tuple[str, ...] = ()) -> Log:
     """Find the reader of consecutive files of one recording and open them as one.
 

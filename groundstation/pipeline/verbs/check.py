@@ -110,7 +110,7 @@ def check_many(
     """
     logs, is_session = require_logs(paths, purpose)
     listen(Event("begin", total=len(logs)))
-    return check_here(logs, configuration, purpose, is_session, fail_on, listen)
+    return check_here(logs, configuration, purpose, is_session, fail_on, listen, is_alone=len(logs) == 1)
 
 
 def require_logs(paths: Sequence[Path], purpose: str) -> tuple[list[Path], bool]:
@@ -121,12 +121,7 @@ def require_logs(paths: Sequence[Path], purpose: str) -> tuple[list[Path], bool]
     UsageError
         As :func:`check_many`.
     """
-    is_session = False
-    if purpose:
-        from groundstation.pipeline.verbs.usable import SESSION_PURPOSES, require_purpose
-
-        require_purpose(purpose)
-        is_session = purpose in SESSION_PURPOSES
+    is_session = require_purpose_of(purpose)
     logs = [as_log(path) for path in paths]
     for path in logs:
         if not path.exists():
@@ -136,6 +131,22 @@ def require_logs(paths: Sequence[Path], purpose: str) -> tuple[list[Path], bool]
     return logs, is_session
 
 
+def require_purpose_of(purpose: str) -> bool:
+    """Tell whether a purpose is that of a session; empty is none.
+
+    Raises
+    ------
+    UsageError
+        When there is no such purpose.
+    """
+    if not purpose:
+        return False
+    from groundstation.pipeline.verbs.usable import SESSION_PURPOSES, require_purpose
+
+    require_purpose(purpose)
+    return purpose in SESSION_PURPOSES
+
+
 def check_here(
     paths: Sequence[Path],
     configuration: Configuration,
@@ -143,18 +154,22 @@ def check_here(
     is_session: bool,
     fail_on: str,
     listen: Listener,
+    *,
+    is_alone: bool,
 ) -> tuple[CheckedLog, ...]:
-    """Return the checks of logs that exist; parameters as of :func:`check_many`."""
+    """Return the checks of logs that exist; parameters as of :func:`check_many`.
+
+    One that is alone is read by the profile; of several each is, that the profile describes.
+    """
     found = []
     flights: dict[int, Flight] = {}
     for number, path in enumerate(paths):
         listen(Event("stage", path.name, "reading"))
-        is_alone = len(paths) == 1
         checked, flight = _check_or_reason(path, configuration, fail_on, with_flight=bool(purpose), is_alone=is_alone)
         if flight is not None and is_session:
             flights[number] = flight
         elif flight is not None:
-            checked = _for_purpose(checked, purpose, flight, configuration, fail_on)
+            checked = with_purpose(checked, purpose, flight, configuration, fail_on)
         found.append(checked)
         listen(Event("end", path.name, checked.outcome.text))
     if flights:
@@ -162,9 +177,10 @@ def check_here(
     return tuple(found)
 
 
-def _for_purpose(
+def with_purpose(
     checked: CheckedLog, purpose: str, flight: "Flight", configuration: Configuration, fail_on: str
 ) -> CheckedLog:
+    """Return the check with the usability of its flight for a purpose."""
     from groundstation.pipeline.verbs.usable import usability_of_flight
 
     try:

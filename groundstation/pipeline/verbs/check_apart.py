@@ -26,13 +26,17 @@ DRAFT = "draft of an ICD"
 
 @dataclass(frozen=True)
 class CheckJob:
-    """Logs to look at in one process: several of a session, else one."""
+    """Logs to look at in one process: several of a session, else one.
+
+    ``is_alone``: no other was named beside it.
+    """
 
     paths: tuple[Path, ...]
     configuration: Configuration
     purpose: str = ""
     is_session: bool = False
     fail_on: str = "none"
+    is_alone: bool = True
 
     @property
     def log(self) -> str:
@@ -78,7 +82,9 @@ class _Several:
 
 
 def _check(job: CheckJob, listen: Listener) -> _Several:
-    found = check_here(job.paths, job.configuration, job.purpose, job.is_session, job.fail_on, listen)
+    found = check_here(
+        job.paths, job.configuration, job.purpose, job.is_session, job.fail_on, listen, is_alone=job.is_alone
+    )
     return _Several(tuple(map(_Told.of, found)))
 
 
@@ -107,7 +113,8 @@ def check_apart(
     def failed(job: CheckJob, reason: str) -> _Several:
         return _Several(tuple(_Told.of(unread(path, f"{path.name}: {reason}")) for path in job.paths))
 
-    jobs = enumerate(CheckJob(group, configuration, purpose, is_session, fail_on) for group in groups)
+    is_alone = len(logs) == 1
+    jobs = enumerate(CheckJob(group, configuration, purpose, is_session, fail_on, is_alone) for group in groups)
     found = each_apart(jobs, _check, _Several, failed, workers=1, listen=listen, bounds=bounds)
     return tuple(told.checked() for _, several in sorted(found, key=lambda item: item[0]) for told in several.checks)
 
@@ -127,14 +134,17 @@ def _describe(job: CheckJob, _listen: Listener) -> _Described:
     try:
         if job.purpose == DRAFT:
             return _Described(draft=suggest_icd(job.paths[0]))
-        return _Described(describe(job.paths[0], configuration.profile_path, configuration.icds))
+        found = describe(job.paths[0], configuration.profile_path, configuration.icds, is_alone=job.is_alone)
+        return _Described(found)
     except UsageError as error:
         return _Described(failure=str(error), is_usage=True)
     except Exception as error:
         return _Described(failure=reason_of(job.name, error)[0])
 
 
-def describe_apart(path: Path, profile: Path | None, icds: tuple[str, ...], bounds: ProcessLimits) -> Description:
+def describe_apart(
+    path: Path, profile: Path | None, icds: tuple[str, ...], bounds: ProcessLimits, *, is_alone: bool = True
+) -> Description:
     """Describe a log in a process of its own.
 
     Raises
@@ -143,7 +153,7 @@ def describe_apart(path: Path, profile: Path | None, icds: tuple[str, ...], boun
         As :func:`groundstation.pipeline.verbs.describe.describe`; where the process went beyond its limits.
     """
     configuration = Configuration(profile=str(profile) if profile else None, icds=icds)
-    found = _described_apart(CheckJob((path,), configuration), bounds)
+    found = _described_apart(CheckJob((path,), configuration, is_alone=is_alone), bounds)
     assert found.description is not None
     return found.description
 

@@ -11,7 +11,7 @@ from groundstation.base.ledger import Ledger
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.base.signals import BUS_PREFIX
 from groundstation.pipeline.many_flights.inputs import no_log
-from groundstation.pipeline.one_flight.log import Log, as_log, open_log
+from groundstation.pipeline.one_flight.log import Log, as_log, open_log, open_one_of_several
 from groundstation.pipeline.one_flight.segments import PowerUpTold, segments_in, segments_of, told_of
 from groundstation.pipeline.verbs.recordings import facts_of_recording, is_of_rerun
 from groundstation.store.info import StoreInfo
@@ -70,10 +70,12 @@ class Description:
         return plain
 
 
-def describe(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()) -> Description:
+def describe(
+    path: Path, profile: Path | None = None, icds: tuple[str, ...] = (), *, is_alone: bool = True
+) -> Description:
     """Describe a recorded log, a groundstation MCAP or a recording.
 
-    ``icds`` name the words of its buses.
+    ``icds`` name the words of its buses. One of several logs is read by the profile if that describes it.
 
     Raises
     ------
@@ -89,7 +91,7 @@ def describe(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()
         raise no_log(path)
     if is_of_rerun(path):
         return Description(facts_of_recording(path), (), (), False)
-    log = open_log(path, profile, icds)
+    log = (open_log if is_alone else open_one_of_several)(path, profile, icds)
     return _stored(log) if log.is_store else _recorded(log)
 
 

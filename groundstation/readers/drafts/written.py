@@ -91,7 +91,10 @@ def _variation(sample: TableSample, used: Sequence[ColumnGuess]) -> Iterator[str
 
 
 def _lines(used: Sequence[ColumnGuess]) -> Iterator[str]:
-    """Yield the lines of the columns; a doubt that several share has one line, above the first of them."""
+    """Yield the lines of the columns.
+
+    A doubt that several share has one line, above the first of them.
+    """
     doubts = columns_in_doubt(used)
     for one in used:
         own = [doubt for doubt, names in doubts.items() if names == (one.name,)]

@@ -48,9 +48,9 @@ def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[Auto
     from groundstation.systems.health import messages
     from groundstation.systems.health.checks import verdict_of
     from groundstation.systems.health.figures import lanes_figure, motors_figure, series_figure
-    from groundstation.systems.health.motors import cannot_taxi
-    from groundstation.systems.health.sentence import told
+    from groundstation.systems.health.sentence_answer import told
     from groundstation.tables.estimator_in_use import estimator_in_use
+    from groundstation.tables.vehicle import is_rotorcraft
 
     found = _checked(flight, known, settings)
     used = estimator_in_use(flight)
@@ -73,7 +73,7 @@ def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[Auto
         estimator="" if used is None else used.name,
         estimator_source="" if used is None else used.source,
         loss=found.loss,
-        cannot_taxi=cannot_taxi(flight),
+        cannot_taxi=is_rotorcraft(flight),
         settings=_stated(settings),
         figures=(
             lanes_figure(found.judged, happenings, flight.duration_s, found.pauses_s),

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from groundstation.base.words import tenths_text
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Cell, Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, Tone
-from groundstation.chapters.wording import ABSENT, clean, clock, number, percent, significant, typeset
+from groundstation.chapters.wording import ABSENT, clean, clock, number, percent, significant, typeset, with_full_stop
 from groundstation.results.flight import FlightResults
 from groundstation.systems.health.answer import (
     FIRST,
@@ -22,6 +22,7 @@ from groundstation.systems.health.answer import (
     span_words,
 )
 from groundstation.systems.health.plots import SIGNS, sign_of
+from groundstation.systems.health.sentence_answer import told_apart
 
 TITLE = "Autopilot health"
 LEAD = "Was GNSS good, was the filter healthy, and what went wrong when."
@@ -53,8 +54,8 @@ def health(results: FlightResults) -> Section | None:
     rest = _happenings([one for one in answer.happenings if one.grade == "info"], "Modes and remarks logged")
     settings = [part for part in (_found(answer), _differing(answer)) if part is not None]
     appendix = (*others, *([] if rest is None else [rest]), _measures(answer), *settings, _basis(answer))
-    headline = typeset(answer.sentence)
-    return Section("health", TITLE, LEAD, tuple(parts), headline, claim=_claim(answer), appendix=appendix)
+    claim = _claim(answer)
+    return Section("health", TITLE, LEAD, tuple(parts), claim.headline, claim=claim, appendix=appendix)
 
 
 def _claim(answer: AutopilotHealth) -> Claim:
@@ -63,9 +64,11 @@ def _claim(answer: AutopilotHealth) -> Claim:
     mark = Mark(TONES[answer.verdict], HEADLINES[answer.verdict])
     passed = sum(one.verdict == "pass" for one in answer.checks)
     logged = sum(one.verdict != "not_logged" for one in answer.checks)
-    sentences = [f"{number(passed, 0)} of {number(logged, 0)} checks pass {answer.judged_over}."]
+    first, rest = told_apart(answer.checks, answer.loss)
+    sentences = [with_full_stop(typeset(one)) for one in rest]
+    sentences.append(f"{number(passed, 0)} of {number(logged, 0)} checks pass {answer.judged_over}.")
     is_danger = answer.verdict == "fail" and answer.is_flown
-    return Claim(Rank.HEALTH, mark, typeset(answer.sentence), "", "", sentences, figures, is_danger=is_danger)
+    return Claim(Rank.HEALTH, mark, typeset(first), "", "", sentences, figures, is_danger=is_danger)
 
 
 def _checks(checks: Sequence[Check]) -> Grid:

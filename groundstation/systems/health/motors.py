@@ -17,7 +17,7 @@ import numpy as np
 from groundstation.base.records import Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.health.answer import AttitudeLoss, MotorOutput
-from groundstation.systems.health.logged import FloatArray, is_number, named
+from groundstation.systems.health.logged import FloatArray, named
 from groundstation.systems.health.px4_topics import topic, topics
 from groundstation.tables.parameters import Parameters, parameters_of
 from groundstation.tables.table import Flight
@@ -27,7 +27,6 @@ MOTORS = (*range(33, 41), *range(82, 86))  # SERVOn_FUNCTION: motors 1 to 12
 PX4_MOTORS = range(101, 113)  # PWM_MAIN_FUNCn: motors 1 to 12
 MOTORS_OF_TYPE = {2: 4, 13: 6, 14: 8}  # MAV_TYPE of a multirotor: its motors are the first outputs
 HELICOPTERS = (6.0, 11.0, 13.0)  # FRAME_CLASS whose "motors" are servos of the swash plate
-CANNOT_TAXI = (2, 3, 4, 13, 14, 15, 29)  # MAV_TYPE: multirotors and helicopters
 THR_MIN = 130.0  # thousandths of the throttle's range, the default until 3.3
 EXPO = 0.65  # default of MOT_THST_EXPO
 FULL = 0.98  # of the travel, where an output counts as at its end
@@ -70,16 +69,6 @@ class Motors:
         """Return the thrust commanded of each, of its greatest, shape (n, motors)."""
         share = np.clip(np.column_stack([one.travel for one in self.each]), 0.0, 1.0)
         return np.asarray((1.0 - self.expo) * share + self.expo * share**2)
-
-
-def cannot_taxi(flight: Flight) -> bool:
-    """Tell whether the log is of a multirotor or helicopter."""
-    for name, field in (("raw.vehicle_status", "system_type"), ("raw.HEARTBEAT", "type")):
-        if name in flight and is_number(flight[name], field):
-            kinds = flight[name].values(field)
-            if np.isin(kinds, CANNOT_TAXI).any():
-                return True
-    return "copter" in f"{flight.metadata.get('vehicle', '')} {flight.metadata.get('firmware', '')}".lower()
 
 
 def motors_of(flight: Flight) -> Motors | None:

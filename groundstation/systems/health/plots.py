@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.chapters.plots.common import label, span
 from groundstation.chapters.wording import unit_sign
-from groundstation.plots.axes import time_axis
+from groundstation.plots.axes import broken_time_axis, time_axis
 from groundstation.plots.marks import AnyMark, Curve, Lanes, Limit, Role, Spans, series
 from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row
 from groundstation.plots.ranges import broken_at_gaps
@@ -111,7 +111,7 @@ def motors(results: FlightResults) -> Plot | None:
         "Motor outputs around the loss of attitude",
         "What each motor was commanded; broken lines: lowest and highest output in flight.",
         "Outputs to the motors over flight time around the loss of control of attitude.",
-        (Row((Panel(marks, time_axis(*span(data.time_s)), axis),), 2.0 * PANEL_MM),),
+        (Row((Panel(marks, broken_time_axis([span(data.time_s)]), axis),), 2.0 * PANEL_MM),),
         ("health_motors",),
     )
 

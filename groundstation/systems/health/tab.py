@@ -12,7 +12,7 @@ from groundstation.systems.health.arrays import HealthLanes
 from groundstation.systems.health.chapter import health as chapter
 from groundstation.viewer import colours
 from groundstation.viewer.names import path_parts
-from groundstation.viewer.plot_views import panels_of, plot_of
+from groundstation.viewer.plot_views import panels_of, plot_of, runs_of
 from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.views import document, lanes
 
@@ -30,7 +30,9 @@ def health(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     shown = _lanes(recorder, answer, results.rows_of(HealthLanes))
     if shown is not None:
         left.append(shown)
-    checks: list[rrb.View | rrb.Container] = list(panels_of(recorder, plot_of(recorder, "health.motors", results)))
+    checks: list[rrb.View | rrb.Container] = [
+        view for run in runs_of(recorder, plot_of(recorder, "health.motors", results), "health/motors") for view in run
+    ]  # seconds around the loss: in a view of the whole flight they are a sliver
     for one in sorted(answer.checks, key=lambda check: ORDER.index(check.verdict)):
         told = plot_of(recorder, "health.panels", results, one.key)
         title = one.title[:1].upper() + one.title[1:]

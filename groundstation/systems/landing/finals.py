@@ -22,6 +22,7 @@ CHORD_S, LONGEST_CHORD_S = 12.0, 40.0  # over which a direction is taken
 STEPS_OF_A_CHORD = 12.0  # of the positions, where they are written in coarse ones
 GROUND_M, FLOWN_M = 1.0, 100.0  # of a height that counts from the airfield: on the ground below, in flight above
 PHASES_SIGMA_S = 3.0  # of a touchdown that phases alone show: 5.3 s early on a rising runway, 1.9 s late by a switch
+ON_LANDING = ("landing roll", "take-off run", "taxi", "on the ground", "standstill")  # phases right behind a flight
 LONGEST_ROLL_S = 60.0  # of a touch-and-go
 AFTER_S = 60.0  # a landing so soon after the lowest point of a descent belongs to it
 CLIMB_S = 240.0
@@ -92,7 +93,7 @@ def _landings(path: FlightPath, phases: "Phases") -> tuple[End, ...]:
     found = []
     for row, before in enumerate(phases.intervals[:-1]):
         after = phases.intervals[row + 1 :]
-        if before.phase == "airborne" and after[0].phase in ("landing roll", "take-off run", "taxi", "standstill"):
+        if before.phase == "airborne" and after[0].phase in ON_LANDING:
             again = next((one.start_s for one in after if one.phase == "airborne"), np.inf)
             outcome: Outcome = "touch-and-go" if _rolls_on(path, before.end_s, again) else "landing"
             found.append(End(before.end_s, outcome, method, PHASES_SIGMA_S, again))

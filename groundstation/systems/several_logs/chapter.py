@@ -68,7 +68,7 @@ def together(results: FlightResults) -> Section | None:
 
 @dataclass(frozen=True)
 class _Seen:
-    """Times of two logs that file time alone places, and how far their motion shows them apart."""
+    """Distance in time of two logs placed by file time, as their motion shows it."""
 
     apart: str
     sentence: str

@@ -10,7 +10,7 @@ from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.timescales import duration_text, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
-from groundstation.systems.joining import NotOneFlightError
+from groundstation.systems.joining import NoCommonClockError, NotOneFlightError
 from groundstation.systems.several_logs.channels import SignalPair, TopicSignals, pair_of
 from groundstation.systems.several_logs.coarse import CoarseLag, grids_of, place_of, steps_of
 from groundstation.systems.several_logs.fine import MotionFit, fit_motion
@@ -77,7 +77,8 @@ def relate(first: TimedLog, other: TimedLog, *, settings: TwoClocksSettings | No
         prior = by_gnss or _by_file_time(files_lag_s)
         if not prior:
             names = f"{first.name} and {other.name}"
-            raise NotOneFlightError(names, f"cannot be put on one clock: no GNSS time in both; {why}")
+            text = "cannot be put on one clock: no GNSS time in both"
+            raise NoCommonClockError(names, f"{text}; {_without_utc(first, other)}; {why}")
         found = replace(base, stretches=prior, reason=f"{_SAYS[prior[0].method]}; {why}")
         if pair is not None:
             _require_no_contradiction(first, other, pair, found, settings)
@@ -88,6 +89,11 @@ def relate(first: TimedLog, other: TimedLog, *, settings: TwoClocksSettings | No
     _require_overlap(first, other, found.stretches)
     _require_near(first, other, found, settings)
     return found
+
+
+def _without_utc(*logs: TimedLog) -> str:
+    """Return which logs have no UTC, by which the times of their files would serve."""
+    return f"no UTC in {' and '.join(log.name for log in logs if not log.flight.has_utc)}"
 
 
 def _both_utc(first: TimedLog, other: TimedLog) -> bool:

@@ -1,4 +1,7 @@
-"""Settings of the aids beside GNSS: barometer, wheels, magnetic heading."""
+"""Settings of the aids beside GNSS.
+
+No sideways motion, barometer, wheels, magnetic heading.
+"""
 
 from dataclasses import dataclass
 
@@ -11,10 +14,13 @@ class AidSettings:
 
     Parameters
     ----------
+    use_no_sideways_motion : bool
+        False: what rolls may slip and leave the ground. It serves what rolls alone, stated or found, where its
+        direction of travel in the unit is steady; never what flies, walks or floats.
     use_barometer : bool
         False: barometric height is not used.
     use_wheel_speed : bool
-        False: the speed of wheels is not used. It serves what rolls alone.
+        False: the speed of wheels is not used. It serves what rolls alone, with ``use_no_sideways_motion``.
     use_magnetic_heading : bool
         False: a magnetic heading is not used. It serves alone where the aircraft file states the deviation of its
         compass.
@@ -26,6 +32,7 @@ class AidSettings:
         Topic of the magnetic heading; empty: chosen by the tool.
     """
 
+    use_no_sideways_motion: bool = True
     use_barometer: bool = True
     use_wheel_speed: bool = True
     use_magnetic_heading: bool = True

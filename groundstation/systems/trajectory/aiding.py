@@ -91,6 +91,27 @@ def aided(
     return done, tuple(rows.values())
 
 
+def may_roll(vehicle: str | None, settings: AidSettings) -> bool:
+    """Tell whether no sideways motion is tried.
+
+    It is of what rolls, unless the user switched it off.
+    """
+    return vehicle == "rolls" and settings.use_no_sideways_motion
+
+
+def row_of_no_slip(vehicle: str | None, done: Estimate, settings: AidSettings) -> tuple[AidRow, ...]:
+    """Return whether no sideways motion was used, of what rolls."""
+    if vehicle != "rolls":
+        return ()
+    if done.problem.has_slip:
+        reason = f"sideways and upward motion of what rolls, {done.model.slip_mps:.2g} m/s"
+    elif not settings.use_no_sideways_motion:
+        reason = "switched off (use_no_sideways_motion): how the unit stands to the travel is not measured either"
+    else:
+        reason = "its direction of travel in the unit is not as steady as that of what rolls"
+    return (AidRow("no sideways motion", "", done.problem.has_slip, reason),)
+
+
 def _leave(rows: dict[str, AidRow], kind: int, why: str, *, is_wrong: bool = True) -> None:
     topic = next(one.topic for one in rows.values() if one.name == NAMES[kind] and one.is_used)
     rows[topic] = replace(rows[topic], is_used=False, reason=why, is_wrong=is_wrong)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-AidName = Literal["barometer", "wheel speed", "magnetic heading"]
+AidName = Literal["no sideways motion", "barometer", "wheel speed", "magnetic heading"]
 
 
 @dataclass(frozen=True)
@@ -14,6 +14,7 @@ class AidRow:
     ----------
     name : str
     topic : str
+        Empty of one that is no sensor.
     is_used : bool
     reason : str
         Why it is not used; of one that is: with what.

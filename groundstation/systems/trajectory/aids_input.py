@@ -126,6 +126,10 @@ def _speed(
         if not rolls:
             rows.append(AidRow("wheel speed", topic, False, "the vehicle is not known to roll"))
             continue
+        if not settings.use_no_sideways_motion:
+            text = "where they point in the unit is known by no sideways motion alone, which is switched off"
+            rows.append(AidRow("wheel speed", topic, False, text))
+            continue
         time_s, value = _known(flight, topic, "speed_mps")
         wrong, told = _wheels_beside(time_s, value, gnss, settings)
         rows.append(AidRow("wheel speed", topic, not wrong, wrong or told, bool(wrong)))

@@ -130,7 +130,10 @@ class TrajectoryParameter:
 
     @property
     def is_far(self) -> bool:
-        """Tell whether it is not observable and yet beyond the 95 % assumed at first: coupled with others."""
+        """Tell whether it is beyond the 95 % assumed at first, yet not observable.
+
+        It is coupled with others.
+        """
         starts_at_zero = self.group not in STARTED_BY_SEARCH
         return starts_at_zero and not self.is_observable and abs(self.value) > NORMAL_95 * self.start_sigma
 

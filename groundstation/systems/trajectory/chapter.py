@@ -274,11 +274,22 @@ def _outages(answer: BestTrajectory) -> Grid | None:
         "height. Smoothed: in post-processing, by the data before and behind. Forward filter: live, by the data before "
         "alone. Other columns are of the smoothed solution."
     )
+    caption += _left_out(answer)
     if answer.outage_truth == "RTK":
         caption += " Its GNSS is RTK."
     else:
         caption += " What GNSS itself has wrong is in both."
     return Grid("Outages of GNSS, replayed", heads, rows, caption, ("trajectory_outages",))
+
+
+def _left_out(answer: BestTrajectory) -> str:
+    """Return how many outages were tried and not replayed, and why."""
+    counts = (
+        (sum(one.standing_count for one in answer.outages), "the vehicle stood"),
+        (sum(one.without_gnss_count for one in answer.outages), "GNSS is not there"),
+    )
+    told = [f"{count} where {why}" for count, why in counts if count]
+    return f" Left out: {', '.join(told)}." if told else ""
 
 
 def _rms_and_worst(rms_m: float | None, worst_m: float | None) -> str:

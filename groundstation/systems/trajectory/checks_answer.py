@@ -87,6 +87,8 @@ class OutageRow:
         Likewise of the height.
     smoothed_worst_m, forward_end_worst_m : float or None
         Largest of the outages.
+    standing_count, without_gnss_count : int
+        Outages of this length that were tried and left out: the vehicle mostly stood, or GNSS is not there.
     """
 
     length_s: float  #: Length of each outage.
@@ -100,6 +102,8 @@ class OutageRow:
     vertical_inside95_share: float | None = None  #: Share of the height errors inside 95 % of their sigma.
     smoothed_worst_m: float | None = None  #: Largest horizontal error of the smoothed solution.
     forward_end_worst_m: float | None = None  #: Largest horizontal error of the forward filter at the end of an outage.
+    standing_count: int = 0  #: Outages tried and left out, as the vehicle mostly stood.
+    without_gnss_count: int = 0  #: Outages tried and left out, as GNSS is not there.
 
 
 @dataclass(frozen=True)

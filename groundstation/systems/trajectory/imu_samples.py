@@ -185,8 +185,8 @@ def _without_repeats(samples: UnitSamples) -> UnitSamples:
         drop = same & ~_long_runs(same)
     if not drop.any():
         return samples
-    kept = np.flatnonzero(~drop)  # the first sample is always kept
-    return replace(samples.take(kept), repeats_after=np.diff(np.append(kept, len(drop))) - 1)
+    rows = np.flatnonzero(~drop)  # the first sample is always one of them
+    return replace(samples.take(rows), repeats_after=np.diff(np.append(rows, len(drop))) - 1)
 
 
 def _long_runs(same: BoolArray, longest: int = 20) -> BoolArray:

@@ -105,7 +105,7 @@ def _increasing(time_s: FloatArray, end_s: float) -> BoolArray:
 
 @dataclass(frozen=True)
 class Bridged:
-    """Seconds bridged for samples that are missing, and for those left out that repeat the one before."""
+    """Seconds bridged for missing samples, and for those left out as repeats."""
 
     missing_s: float
     repeats_s: float

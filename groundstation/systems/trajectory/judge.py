@@ -161,6 +161,8 @@ def outage_rows(outages: Outages, factor: float, height: float) -> tuple[OutageR
                 float(np.mean(outages.down_ratio[of] <= height)),
                 float(np.max(outages.error_m[of])),
                 float(np.max(outages.forward_end_m[of])),
+                outages.left_out(length_s, standing=True),
+                outages.left_out(length_s, standing=False),
             )
         )
     return tuple(rows)

@@ -3,7 +3,8 @@
 Errors are against the undisturbed solution, with their sigmas.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
@@ -54,6 +55,8 @@ class Outages:
         What is to be expected of it: the variance that leaving out the data added.
     down_m, down_ratio : ndarrays, shape (n,)
         Largest vertical error of the smoothed solution inside, and it over its 95 % bound.
+    left_out_length_s, left_out_standing : ndarrays, shape (k,)
+        Outages that were not replayed: length, and 1 where the vehicle mostly stood, 0 where GNSS is not there.
     """
 
     start_s: FloatArray
@@ -67,6 +70,8 @@ class Outages:
     attitude_variance: FloatArray
     down_m: FloatArray
     down_ratio: FloatArray
+    left_out_length_s: FloatArray = field(default_factory=lambda: np.zeros(0))
+    left_out_standing: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def __len__(self) -> int:
         return len(self.start_s)
@@ -75,43 +80,73 @@ class Outages:
         """Tell which rows are of a length."""
         return np.asarray(self.length_s == length_s)
 
+    def left_out(self, length_s: float, *, standing: bool) -> int:
+        """Return how many outages of a length were not replayed.
+
+        The vehicle stood in them; else GNSS is not there.
+        """
+        return int(np.count_nonzero((self.left_out_length_s == length_s) & (self.left_out_standing == standing)))
+
 
 def replay(estimate: Estimate, lengths_s: tuple[float, ...] = LENGTHS_S) -> Outages:
     """Replay outages of each length; several lie in one run, apart from each other."""
     rows: list[tuple[float, ...]] = []
+    left: list[tuple[float, float]] = []
     for length_s in lengths_s:
-        rows += _of_length(estimate, length_s)
+        rows += _of_length(estimate, length_s, left)
     table = np.array(rows, dtype=np.float64).reshape(-1, 17)
     start, length, error, sigma, ratio, end = table[:, :6].T
     return Outages(
-        start, length, error, sigma, ratio, end, table[:, 6:9], table[:, 9:12], table[:, 12:15], *table[:, 15:].T
+        start,
+        length,
+        error,
+        sigma,
+        ratio,
+        end,
+        table[:, 6:9],
+        table[:, 9:12],
+        table[:, 12:15],
+        *table[:, 15:].T,
+        *np.array(left, dtype=np.float64).reshape(-1, 2).T,
     )
 
 
-def _of_length(estimate: Estimate, length_s: float) -> list[tuple[float, ...]]:
+def starts_of(estimate: Estimate, length_s: float) -> list[FloatArray]:
+    """Return the starts of outages of a length, those of one run together."""
     times = estimate.result.plan.epoch_s
     period_s = length_s + max(APART_S, length_s)
     first_s, last_s = times[0] + LEAD_S, times[-1] - TAIL_S
     places = max(0.0, (last_s - first_s - length_s) / period_s)
     runs = int(np.clip(np.ceil(ENOUGH / max(1.0, places)), 1, MOST_RUNS))
+    return [np.arange(first_s + run * period_s / runs, last_s - length_s, period_s) for run in range(runs)]
+
+
+def _of_length(estimate: Estimate, length_s: float, left: list[tuple[float, float]]) -> list[tuple[float, ...]]:
+    """Replay the outages of a length, and add to ``left`` those that tell nothing."""
     rows: list[tuple[float, ...]] = []
-    for run in range(runs):
-        starts = np.arange(first_s + run * period_s / runs, last_s - length_s, period_s)
+    for starts in starts_of(estimate, length_s):
         windows = np.column_stack([starts, starts + length_s])
-        windows = windows[[_is_fit(estimate, start, end) for start, end in windows]] if len(windows) else windows
+        why = [_why_not(estimate, start, end) for start, end in windows]
+        left += [(length_s, float(one == "stands")) for one in why if one]
+        windows = windows[[not one for one in why]] if len(windows) else windows
         if len(windows):
             done = without(estimate, windows)
             rows += [_row(estimate.result, done, start, end, length_s) for start, end in windows]
     return rows
 
 
-def _is_fit(estimate: Estimate, start_s: float, end_s: float) -> bool:
-    """Tell whether GNSS is there and the vehicle moves."""
+def _why_not(estimate: Estimate, start_s: float, end_s: float) -> Literal["", "no GNSS", "stands"]:
+    """Return why an outage tells nothing; empty where it does.
+
+    GNSS is not there in any case, or the vehicle hardly moves.
+    """
     plan = estimate.result.plan
     inside = (plan.valid_s >= start_s) & (plan.valid_s < end_s)
     fixes = inside & (plan.seen.kind == POSITION)
     still = inside & (plan.seen.kind == STILL)
-    return bool(fixes.sum() >= 2 and still.sum() < MOVING_SHARE * (end_s - start_s))
+    if fixes.sum() < 2:
+        return "no GNSS"
+    return "stands" if still.sum() >= MOVING_SHARE * (end_s - start_s) else ""
 
 
 def hidden(plan: Plan, windows: FloatArray) -> BoolArray:

@@ -11,6 +11,7 @@ from groundstation.base.findings import Finding
 from groundstation.results.gates import Gate, judged_gate
 from groundstation.systems.known import Known
 from groundstation.systems.trajectory import checks, figures, fix_residuals, judge, tell
+from groundstation.systems.trajectory.aiding import may_roll, row_of_no_slip
 from groundstation.systems.trajectory.aids_input import Aids, aids_of
 from groundstation.systems.trajectory.answer import BestTrajectory, TrajectoryState
 from groundstation.systems.trajectory.checks_answer import HeadingHypothesis, InnovationRow, RaisedSigma
@@ -68,7 +69,7 @@ def solve(
         gathered.gnss,
         gap_s=settings.input.segment_s,
         least_s=settings.segment_min_s,
-        may_roll=vehicle == "rolls",
+        may_roll=may_roll(vehicle, settings.aids),
         may_stop=vehicle in ("rolls", "walks"),
         latency_s=lag_s if np.isfinite(lag_s) and abs(lag_s) > COARSE_LAG_S else 0.0,
         aids=aids_beside(flight, known, gathered, mounting, settings),
@@ -207,7 +208,7 @@ def _answered(
         outages=judge.outage_rows(outages, factors.position, factors.height),
         outage_truth="RTK" if gathered.gnss_facts.precise_share > 0.9 else "undisturbed solution",
         hypotheses=hypotheses,
-        aids=segments[place].aids,
+        aids=(*row_of_no_slip(vehicle, main, settings.aids), *segments[place].aids),
         onboard=compared[0].errors if compared else None,
         other_filters=tuple(one.errors for one in compared[1:]),
         separation=separation,

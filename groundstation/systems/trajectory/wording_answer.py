@@ -39,7 +39,10 @@ def accuracy_words(answer: BestTrajectory) -> str:
 
 
 def line_of(answer: BestTrajectory) -> str:
-    """Return the sentence of a line on the terminal: where it tells accuracy, whose attitude that is comes first."""
+    """Return the sentence of a line on the terminal.
+
+    Before an accuracy stands whose attitude it is of.
+    """
     told = sentence_of(answer)
     is_accuracy = answer.state == "accepted" and told == accuracy_words(answer)
     return f"{whose}: {told}" if is_accuracy and (whose := whose_words(answer)) else told

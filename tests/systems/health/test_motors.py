@@ -1,6 +1,7 @@
 """The motor that a lost attitude points to, by what a mixer commands when one fails, and advice after it."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,11 +10,17 @@ from groundstation.base.records import Column
 from groundstation.chapters.parts import Facts
 from groundstation.results.flight import FlightResults, NotAssessable
 from groundstation.systems.health.answer import AutopilotHealth
+from groundstation.systems.health.chapter import health
 from groundstation.systems.health.figures import lanes_figure
-from groundstation.systems.health.motors import ardupilot_ends, cannot_taxi
+from groundstation.systems.health.motors import ardupilot_ends
 from groundstation.systems.health.plots import PLOTS
+from groundstation.systems.health.system import SYSTEM
+from groundstation.systems.system import Systems
 from groundstation.tables.parameters import parameters_of
 from groundstation.tables.table import Flight, Table
+from groundstation.tables.vehicle import is_rotorcraft
+from groundstation.viewer.recording import write_recording
+from tests.recording_contents import Contents
 from tests.report_example import example
 from tests.systems.health.made import table
 from tests.systems.health.test_ardupilot import END_S, answer, flight, parameters
@@ -186,7 +193,7 @@ def test_a_kind_that_cannot_taxi() -> None:
     kinds = {2.0: True, 1.0: False, 10.0: False, 4.0: True}
     for kind, expected in kinds.items():
         status = table("raw.vehicle_status", [0.0, 1.0], system_type=kind)
-        assert cannot_taxi(Flight({status.topic: status}, {}, 0, False, "made.ulg")) == expected
+        assert is_rotorcraft(Flight({status.topic: status}, {}, 0, False, "made.ulg")) == expected
 
 
 def test_the_panel_has_each_output_around_the_loss() -> None:
@@ -197,6 +204,35 @@ def test_the_panel_has_each_output_around_the_loss() -> None:
     assert [mark.name for mark in marks if mark.name.startswith("output")] == [f"output {k}" for k in range(1, 5)]
     x = next(mark.x for mark in marks if mark.name == "output 1")  # type: ignore[attr-defined]
     assert x.min() == pytest.approx(LOST_S - 3.0) and x.max() == pytest.approx(LOST_S + 5.0)
+
+
+def test_the_recording_shows_the_seconds_around_the_loss_on_an_axis_of_their_own(tmp_path: Path) -> None:
+    one = made(*flown(2))
+    found = answer(one)
+    results = replace(example(), answers={"health": found}, figures=found.figures)
+    plot = PLOTS["health.motors"](results)
+    assert plot is not None
+    (window,) = plot.rows[0].panels[0].x.windows
+    assert window == pytest.approx((LOST_S - 3.0, LOST_S + 5.0))
+    write_recording(tmp_path / "a.rrd", one, results, Systems((SYSTEM,)))
+    contents = Contents(tmp_path / "a.rrd")
+    chart = [path for path in contents.fixed if path.startswith("/health/motors/1/")]
+    (cursor,) = {path for path in contents.batches if path.startswith("/health/motors/") and path.endswith("/cursor")}
+    shown_s = np.sort(contents.times(cursor)) / 1e9
+    assert chart and shown_s[0] > LOST_S - 3.1 and shown_s[-1] < LOST_S + 5.2
+    assert not any("/health/motors/" in path and "lines" in path for path in contents.batches)
+
+
+def test_the_first_line_says_what_failed_first_and_a_list_says_the_rest() -> None:
+    lost = made(*flown(2), table("raw.ERR", [LOST_S + 2.0], Subsys=12.0, ECode=1.0))
+    found = answer(lost)
+    section = health(replace(example(), answers={"health": found}, figures=found.figures))
+    assert section is not None and section.claim is not None
+    first, rest = section.claim.headline, section.claim.sentences
+    assert "control of attitude lost" in first.lower() and "output 2 suspect" in first and ";" not in first
+    bad = sum(one.is_bad for one in found.checks)
+    assert bad > 1 and len(rest) >= bad and "checks pass" in rest[-1]
+    assert not any(first in one for one in rest) and all(one.endswith(".") for one in rest)
 
 
 def test_lanes_end_with_the_log_and_are_not_logged_in_its_pauses() -> None:

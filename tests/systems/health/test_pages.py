@@ -46,5 +46,6 @@ def test_the_chapter_opens_with_what_failed(results: FlightResults) -> None:
     section = health(results)
     assert section is not None and section.claim is not None
     assert section.claim.mark.tone == "bad" and section.claim.is_danger
-    assert section.claim.headline.startswith("Vibration high 0:40-1:00; GNSS good, filter healthy")
+    assert section.claim.headline == section.headline == "Vibration high 0:40-1:00"
+    assert section.claim.sentences[0].startswith("GNSS good, filter healthy")
     assert "Not logged" in markdown(section)

@@ -11,19 +11,30 @@ from groundstation.base.geodesy import north_east_m
 from groundstation.simulation.imu.families import Family
 from groundstation.simulation.imu.flight import ImuFlight, simulate_imu
 from groundstation.simulation.imu.scenario import ImuScenario
-from groundstation.simulation.imu.settings import ImuSettings, MountingSettings, ReceiverSettings, StampSettings
+from groundstation.simulation.imu.settings import (
+    ImuSettings,
+    MountingSettings,
+    ReceiverSettings,
+    StampSettings,
+    WheelSettings,
+)
 from groundstation.simulation.imu.tables import log_tables
 from groundstation.simulation.scenario import LogInterval
 from groundstation.systems.known import Known
+from groundstation.systems.trajectory.aid_settings import AidSettings
+from groundstation.systems.trajectory.aiding import may_roll
+from groundstation.systems.trajectory.answer import TRAVEL
 from groundstation.systems.trajectory.estimate import Estimate, estimate
 from groundstation.systems.trajectory.inputs import GnssFixes, ImuIncrements
 from groundstation.systems.trajectory.judge import outage_rows, raised
-from groundstation.systems.trajectory.outages import Outages, replay
+from groundstation.systems.trajectory.outages import LENGTHS_S, Outages, replay, starts_of
 from groundstation.systems.trajectory.sampling import at_times
 from groundstation.systems.trajectory.settings import TrajectorySettings
 from groundstation.systems.trajectory.solve import solve
+from groundstation.systems.trajectory.states import NO_SLIP, POSITION
 from groundstation.systems.trajectory.track import smoothed_track
 from groundstation.tables.phases import flight_phases
+from groundstation.tables.vehicle import Vehicle
 
 WITHIN = 4.0  # sigmas: of some hundred independent errors none is larger
 
@@ -108,6 +119,47 @@ def test_outages_grow_with_their_length_and_stay_inside() -> None:
     assert rms[0] < rms[1] < 20.0
     assert np.mean(outages.ratio <= 1.0) > 0.8
     assert np.median(outages.forward_end_m / outages.error_m) > 1.5
+
+
+def test_outages_tried_are_those_told_and_those_left_out_with_the_reason() -> None:
+    flight, done = found("drive")
+    gone = (100.0, 160.0)  # a tunnel: no GNSS
+    inside = (done.result.plan.valid_s >= gone[0]) & (done.result.plan.valid_s < gone[1])
+    kind = np.where(inside & (done.result.plan.seen.kind == POSITION), NO_SLIP, done.result.plan.seen.kind)
+    plan = replace(done.result.plan, seen=done.result.plan.seen._replace(kind=kind))
+    outages = replay(replace(done, result=replace(done.result, plan=plan)))
+    rows = outage_rows(outages, 1.0, 1.0)
+    tried = {length: sum(map(len, starts_of(done, length))) for length in LENGTHS_S}
+    assert {row.length_s: row.count + row.standing_count + row.without_gnss_count for row in rows} == {
+        row.length_s: tried[row.length_s] for row in rows
+    }
+    assert len(outages) == sum(row.count for row in rows)
+    assert len(outages) + len(outages.left_out_length_s) == sum(tried.values())
+    ten = rows[0]
+    within = [start for start in np.concatenate(starts_of(done, 10.0)) if gone[0] <= start and start + 10.0 <= gone[1]]
+    assert ten.length_s == 10.0 and ten.without_gnss_count >= len(within) > 0
+    assert flight.family == "drive"
+
+
+def test_no_sideways_motion_is_of_what_rolls_and_can_be_switched_off() -> None:
+    on, off = AidSettings(), AidSettings(use_no_sideways_motion=False)
+    assert [may_roll(kind, on) for kind in ("rolls", "flies", "walks", "floats", None)] == [True, *[False] * 4]
+    assert not may_roll("rolls", off)
+    settings = ImuSettings(duration_s=240.0, rate_hz=25.0, imu_class="consumer", wheels=WheelSettings(rate_hz=10.0))
+    log = log_tables(simulate_imu("drive", 4, settings=settings), ImuScenario("drive")).without("truth")
+    known = Known(phases=replace(flight_phases(log), vehicle=Vehicle("rolls", "stated")))
+    free, held = (solve(log, known, TrajectorySettings(aids=one))[0] for one in (off, on))
+    assert held.aids[0].name == "no sideways motion" and held.aids[0].is_used
+    assert held.parameter(TRAVEL[0]) is not None and "no sideways" in str(held.innovations)
+    assert not any(row.is_used for row in free.aids) and "switched off" in free.aids[0].reason
+    assert "switched off" in next(row.reason for row in free.aids if row.name == "wheel speed")
+    assert free.parameter(TRAVEL[0]) is None and "no sideways" not in str(free.innovations)
+    minute = [next(row for row in one.outages if row.length_s == 60.0) for one in (free, held)]
+    assert minute[0].forward_end_rms_m > 2.0 * minute[1].forward_end_rms_m  # type: ignore[operator]
+    boat = solve(
+        log, replace(known, phases=replace(known.phases, vehicle=Vehicle("floats", "stated"))), TrajectorySettings()
+    )
+    assert boat[0].parameter(TRAVEL[0]) is None and "no sideways motion" not in {row.name for row in boat[0].aids}
 
 
 def test_later_in_time_all_is_the_same() -> None:

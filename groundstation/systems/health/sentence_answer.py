@@ -10,6 +10,7 @@ from groundstation.base.words import clock_text, listed, tenths_text
 from groundstation.systems.health.answer import FIRST, IN_TENTHS_S, LOST, AttitudeLoss, Check, gravity, span_words
 
 MOST_BAD = 4
+BEGINS = "first: "
 MORE = re.compile(r" and \d+ more$")
 APART_S = 0.05  # failures that begin nearer have no order
 THROUGHOUT = " throughout"
@@ -80,17 +81,38 @@ def told(checks: Sequence[Check], loss: AttitudeLoss | None = None) -> str:
     What fails, in order of time where it has times, what warns, then what of GNSS, filter and vibration is good, then
     what is not logged.
     """
-    known = {one.key: one for one in checks}
-    first = [known[key] for key in FIRST if key in known]
     bad = sorted((one for one in checks if one.is_bad), key=gravity)
     parts = _by_time(bad[:MOST_BAD], loss)
     if len(bad) > MOST_BAD:
         parts.append(f"and {len(bad) - MOST_BAD} more")
-    good = [_part(one) for one in first if one.verdict == "pass"]
+    shown = "; ".join(", ".join(filter(None, group)) for group in (parts, _of_the_first(checks)) if any(group))
+    return _capital(shown)
+
+
+def told_apart(checks: Sequence[Check], loss: AttitudeLoss | None = None) -> tuple[str, tuple[str, ...]]:
+    """Return what failed first, and when, and the rest of the sentence in parts.
+
+    The rest is all else that is bad, then what is good. Without a failure the first is what warns, else what is good.
+    """
+    bad = sorted((one for one in checks if one.is_bad), key=gravity)
+    parts = [part for part in _by_time(bad, loss) if part]
+    begins = next((part for part in parts if part.startswith(BEGINS)), parts[0] if parts else "")
+    good = ", ".join(_of_the_first(checks))
+    rest = [part for part in parts if part != begins] + ([good] if good and begins else [])
+    return _capital(begins or good), tuple(map(_capital, rest))
+
+
+def _of_the_first(checks: Sequence[Check]) -> list[str]:
+    """Return what is good of GNSS, filter and vibration, and what of them is not logged."""
+    known = {one.key: one for one in checks}
+    first = [known[key] for key in FIRST if key in known]
     absent = [NAMES[one.key] for one in first if one.verdict == "not_logged"]
-    unknown = [f"{listed(absent)} not logged"] if absent else []
-    shown = "; ".join(", ".join(filter(None, group)) for group in (parts, [*good, *unknown]) if any(group))
-    return shown[:1].upper() + shown[1:]
+    good = [_part(one) for one in first if one.verdict == "pass"]
+    return [*filter(None, good), *([f"{listed(absent)} not logged"] if absent else [])]
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def _by_time(bad: Sequence[Check], loss: AttitudeLoss | None) -> list[str]:
@@ -107,7 +129,7 @@ def _by_time(bad: Sequence[Check], loss: AttitudeLoss | None) -> list[str]:
     others = [one for one in bad if one not in failed]
     before = [_part(one) for one in others if one.verdict == "fail"]
     after = [_part(one) for one in others if one.verdict != "fail"]
-    return [*before, f"first: {timed[0]}", f"then {timed[1]}", *timed[2:], *after]
+    return [*before, f"{BEGINS}{timed[0]}", f"then {timed[1]}", *timed[2:], *after]
 
 
 def _part(check: Check, loss: AttitudeLoss | None = None, *, in_tenths: bool = False) -> str:
