@@ -8,16 +8,20 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Literal
 
 import rerun as rr
 from rerun.chunk import Chunk, RrdReader
 
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
-from groundstation.viewer.file_contents import MAGIC, VIEWPORT, rerun_version, version_in
+from groundstation.viewer.file_contents import MAGIC, VIEWPORT, layout_of, rerun_version, version_in
 from groundstation.viewer.held_stream import FLUSH_SECONDS
 from groundstation.viewer.inner import new_blueprint, send_made
 from groundstation.viewer.verification import damaged
 
+# First parts of entity paths that no other kind of recording has.
+OF_A_SESSION = frozenset({"cooperative"})
+OF_A_FLEET = frozenset({"fleet", "aircraft", "by_aircraft", "flights", "failed"})
 SAVE_IT = "in the viewer: menu, Save blueprint"
 MOST_BYTES = 50_000_000  # of a layout; one of 50 views has 0.8 MB
 
@@ -49,6 +53,16 @@ def read_layout(path: Path) -> bytes:
         if not any(chunk.entity_path == VIEWPORT for chunk in chunks):
             raise UsageError(where, "a blueprint without views", "one of a flight's recording", SAVE_IT)
     return content
+
+
+def kind_of(path: Path) -> Literal["flight", "session", "fleet"]:
+    """Return the kind of recording whose entities the views of a layout show."""
+    roots = {
+        shown.lstrip("/").partition("/")[0] for tab in layout_of(path) for _name, paths in tab.views for shown in paths
+    }
+    if roots & OF_A_SESSION:
+        return "session"
+    return "fleet" if roots & OF_A_FLEET else "flight"
 
 
 @contextmanager
