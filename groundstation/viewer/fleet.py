@@ -55,7 +55,7 @@ def write_fleet_recording(path: Path, fleet: FleetResults, systems: Systems, lay
 
 
 def send_fleet(stream: rr.RecordingStream, fleet: FleetResults, systems: Systems, layout: bytes = b"") -> rrb.Blueprint:
-    """Log a fleet to a stream that has its sink, its layout first, or a saved one in its place.
+    """Log a fleet to a stream that has its sink, its layout or a saved one first.
 
     Waits until all is out; returns the layout.
     """

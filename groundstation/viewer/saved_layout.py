@@ -8,7 +8,6 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Literal
 
 import rerun as rr
 from rerun.chunk import Chunk, RrdReader
@@ -19,9 +18,6 @@ from groundstation.viewer.held_stream import FLUSH_SECONDS
 from groundstation.viewer.inner import new_blueprint, send_made
 from groundstation.viewer.verification import damaged
 
-# First parts of entity paths that no other kind of recording has.
-OF_A_SESSION = frozenset({"cooperative"})
-OF_A_FLEET = frozenset({"fleet", "aircraft", "by_aircraft", "flights", "failed"})
 SAVE_IT = "in the viewer: menu, Save blueprint"
 MOST_BYTES = 50_000_000  # of a layout; one of 50 views has 0.8 MB
 
@@ -55,14 +51,10 @@ def read_layout(path: Path) -> bytes:
     return content
 
 
-def kind_of(path: Path) -> Literal["flight", "session", "fleet"]:
-    """Return the kind of recording whose entities the views of a layout show."""
-    roots = {
-        shown.lstrip("/").partition("/")[0] for tab in layout_of(path) for _name, paths in tab.views for shown in paths
-    }
-    if roots & OF_A_SESSION:
-        return "session"
-    return "fleet" if roots & OF_A_FLEET else "flight"
+def roots_of(path: Path) -> frozenset[str]:
+    """Return the first parts of the entity paths that the views of a layout show."""
+    paths = (shown for tab in layout_of(path) for _name, listed in tab.views for shown in listed)
+    return frozenset(one.lstrip("/").partition("/")[0] for one in paths)
 
 
 @contextmanager

@@ -8,13 +8,15 @@ from pathlib import Path
 from typing import Literal
 
 from groundstation.base.errors import UsageError
+from groundstation.results.answer import SessionAnswer
 
+OF_A_FLEET = frozenset({"fleet", "aircraft", "by_aircraft", "flights", "failed"})  # first parts of entity paths
 KindOfRecording = Literal["flight", "session", "fleet"]
 
 
 @dataclass(frozen=True)
 class SavedLayout:
-    """Layout saved in the viewer: name of its file, packed content, and which recordings it is of.
+    """Layout saved in the viewer: name of its file, packed content, kind of its recordings.
 
     A view shows entities by their paths, and those of flights, sessions and fleets differ: in place of the tabs of
     another kind of recording it would be empty.
@@ -45,9 +47,18 @@ def saved_layout(path: Path | None) -> SavedLayout | None:
     """
     if path is None:
         return None
-    from groundstation.viewer.saved_layout import kind_of, read_layout
+    from groundstation.viewer.saved_layout import read_layout, roots_of
 
-    return SavedLayout(path.name, zlib.compress(read_layout(path)), kind_of(path))
+    return SavedLayout(path.name, zlib.compress(read_layout(path)), _kind_of(roots_of(path)))
+
+
+def _kind_of(roots: frozenset[str]) -> KindOfRecording:
+    """Return the kind of recording that has entities of these first parts."""
+    from groundstation.systems import systems
+
+    if roots & {name for tab in systems().tabs_of(SessionAnswer) for name in tab.shows}:
+        return "session"
+    return "fleet" if roots & OF_A_FLEET else "flight"
 
 
 def saved_layouts(paths: Iterable[Path]) -> tuple[SavedLayout, ...]:
