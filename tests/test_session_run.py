@@ -9,6 +9,7 @@ from pathlib import Path
 
 import fsspec
 import pytest
+import rerun.blueprint as rrb
 
 from groundstation.cli.main import main
 from groundstation.pipeline.many_flights.inputs import flight_folders, session_folders
@@ -23,6 +24,7 @@ from groundstation.results.flight import FlightResults
 from groundstation.simulation.session_log import write_session
 from groundstation.systems import systems
 from groundstation.systems.cooperative.answer import CooperativeResult
+from groundstation.viewer.file_contents import layout_of
 from tests.session_example import SEED, SHORT
 
 IDENTITY = "20180305T120000Z_session_A-B-C"
@@ -453,6 +455,17 @@ def test_a_warning_of_the_session_reaches_the_exit_code(logs: Path, tmp_path: Pa
     call = ("run", *sorted(logs.glob("*.csv"))[:2], "-o", tmp_path / "out", "-q", "--no-pdf", "-j", "1")
     assert called(*call, "--fail-on", "fail") == 0
     assert called(*call, "--fail-on", "warn") == 4, "ranges to C: no log"
+
+
+def test_a_session_shows_the_layout_that_was_saved_from_one(logs: Path, tmp_path: Path) -> None:
+    page = rrb.Vertical(contents=[rrb.TextDocumentView(origin="/cooperative/answer")], name="Mine")
+    rrb.Blueprint(rrb.Tabs(page), auto_views=False).save("groundstation another", str(tmp_path / "mine.rbl"))
+    call = ("run", *sorted(logs.glob("*.csv"))[:2], "-o", tmp_path / "out", "-q", "-j", "1")
+    assert called(*call, "--layout", tmp_path / "mine.rbl") == 0
+    (session,) = session_folders(tmp_path / "out")
+    tabs = {path.parent.name: [tab.name for tab in layout_of(path)] for path in (tmp_path / "out").glob("*/*.rrd")}
+    assert tabs.pop(session.name) == ["Mine"] and len(tabs) == 2
+    assert all("Overview" in found for found in tabs.values()), "flights keep their own"
 
 
 # ------------------------------------------------------------------------------------------------ the fleet

@@ -56,5 +56,5 @@ def test_every_object_of_summary_json_has_its_fields_once() -> None:
 
 def test_every_signal_has_its_range() -> None:
     page = loaded()._signals()
-    assert "| `true_heading_deg` | double | deg | [0, 360) |" in page
+    assert "| `true_heading_deg` | double | deg | [0, 360) | nose, clockwise |" in page
     assert page.count("| `") == sum(len(fields) for topic, fields in TOPICS.items() if topic != "truth")

@@ -13,6 +13,7 @@ import typer.main
 
 import groundstation
 from groundstation.base.findings import Severity
+from groundstation.base.signal_senses import sense_of
 from groundstation.base.signals import TOPICS, Field
 from groundstation.base.unit_names import UNITS
 from groundstation.cli.main import app
@@ -31,7 +32,6 @@ def pages() -> Mapping[str, str]:
         "ref_settings.md": _settings(),
         "ref_summary.md": _summary(json.loads(SCHEMA.read_text(encoding="utf-8"))),
         "ref_findings.md": _findings(),
-        "ref_signals.md": _signals(),
         "ref_analyses.md": _catalogue("Every analysis", "analysis"),
         "ref_formats.md": _catalogue("Every format", "format"),
         "ref_scenarios.md": _catalogue("Simulated flights and sessions", "scenario", "session"),
@@ -170,8 +170,7 @@ def _summary(schema: Mapping[str, Any]) -> str:
     objects = schema["$defs"]
     parts = [
         "# Every field of summary.json\n",
-        f"{schema['description']} Written from schemas/summary.schema.json; a field without a meaning says it by its "
-        "name. `or null`: the value may be missing.\n",
+        f"{schema['description']} Written from schemas/summary.schema.json; `or null`: the value may be missing.\n",
         _fields(schema, objects),
     ]
     results = schema["properties"]["results"]["properties"]
@@ -259,13 +258,16 @@ def _kind(kind: str, one: Mapping[str, Any]) -> str:
 def _signals() -> str:
     parts = [
         "# Every signal\n",
-        "Topics and fields with their units and ranges; the [glossary](glossary.md) has their signs. A value out of "
-        "its range is counted by `check`. `truth` has the fields of `ins`.\n",
+        "Topics and fields with units, ranges and senses, as the code has them; words and frames stand in the "
+        "[glossary](glossary.md). A value out of its range is counted by `check`. `truth` has the fields of `ins` and "
+        "only judges results.\n",
     ]
     for topic, fields in TOPICS.items():
         if topic != "truth":
-            rows = [(f"`{one.name}`", one.kind, _unit(one.name), _range(one)) for one in fields]
-            parts.append(f"## {topic}\n\n" + table(("field", "kind", "unit", "range"), rows))
+            rows = [
+                (f"`{one.name}`", one.kind, _unit(one.name), _range(one), sense_of(topic, one.name)) for one in fields
+            ]
+            parts.append(f"## {topic}\n\n" + table(("field", "kind", "unit", "range", "sense"), rows))
     return "\n".join(parts)
 
 

@@ -209,7 +209,17 @@ Layout = Annotated[
     Path | None,
     typer.Option(
         "--layout",
-        help="Layout saved in the viewer (blueprint, .rbl): recordings show it in place of the default tabs.",
+        help="Layout saved in the viewer (blueprint, .rbl): the recording shows it in place of the default tabs.",
+        metavar="FILE",
+        readable=False,
+    ),
+]
+Layouts = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--layout",
+        help="Layout saved in the viewer (blueprint, .rbl), which flights, sessions or fleet.rrd show in place of the "
+        "default tabs, whichever it was saved from. May be repeated.",
         metavar="FILE",
         readable=False,
     ),

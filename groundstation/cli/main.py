@@ -29,6 +29,7 @@ from groundstation.cli.application import (
     Jobs,
     Json,
     Layout,
+    Layouts,
     Only,
     Pdf,
     PowerUp,
@@ -139,7 +140,7 @@ def run(
             readable=False,
         ),
     ] = None,
-    layout: Layout = None,
+    layouts: Layouts = None,
     pdf: Pdf = False,
     only: Only = None,
     store: Store = "",
@@ -173,17 +174,17 @@ def run(
         installed_as,
         load_configuration,
     )
-    from groundstation.pipeline.one_flight.layout import saved_layout
+    from groundstation.pipeline.one_flight.layout import saved_layouts
     from groundstation.pipeline.one_flight.progress import silent
 
     refuse_pdf_of_results(only, pdf=pdf)
     settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd, weather, without)
     is_one_log = together or (len(paths) == 1 and not Path(paths[0]).is_dir())
     settings = installed_as(applying(settings, apply), installation)
-    if layout is not None and only == "results":
+    if layouts and only == "results":
         raise UsageError("--layout", "--only results", "recordings to lay out")
     settings = judged_by(settings, reference or (), is_one_log=is_one_log)
-    configuration = replace(settings, layout=saved_layout(layout))
+    configuration = replace(settings, layouts=saved_layouts(layouts or ()))
     if together and (dry_run or scheduler or stations is not None or timeout is not None or store or isolate):
         beside = "--dry-run, --scheduler, --stations, --timeout, --store or --isolate"
         raise UsageError("--together", beside, "--together without them")

@@ -34,7 +34,7 @@ FLEET = "fleet"
 FLIGHTS_TEXT = "flights"  # entity of the table of flights
 
 
-def write_fleet_recording(path: Path, fleet: FleetResults, systems: Systems) -> None:
+def write_fleet_recording(path: Path, fleet: FleetResults, systems: Systems, layout: bytes = b"") -> None:
     """Write the recording of a fleet, blueprint embedded.
 
     Parameters
@@ -43,17 +43,19 @@ def write_fleet_recording(path: Path, fleet: FleetResults, systems: Systems) -> 
         The .rrd file; its folder holds the flight folders that its links name. Moved into place when complete.
     fleet : FleetResults
     systems : Systems
+    layout : bytes
+        A saved layout in place of the default one; empty: none.
 
     Raises
     ------
     GroundstationError
         When Rerun refused the data or the file could not be written.
     """
-    save_stream(path, FLEET, lambda stream: send_fleet(stream, fleet, systems))
+    save_stream(path, FLEET, lambda stream: send_fleet(stream, fleet, systems, layout))
 
 
-def send_fleet(stream: rr.RecordingStream, fleet: FleetResults, systems: Systems) -> rrb.Blueprint:
-    """Log a fleet to a stream that has its sink, its layout first.
+def send_fleet(stream: rr.RecordingStream, fleet: FleetResults, systems: Systems, layout: bytes = b"") -> rrb.Blueprint:
+    """Log a fleet to a stream that has its sink, its layout or a saved one first.
 
     Waits until all is out; returns the layout.
     """
@@ -68,9 +70,10 @@ def send_fleet(stream: rr.RecordingStream, fleet: FleetResults, systems: Systems
         *(held.attempt("tab", name, partial(tab, recorder, fleet, found)) for name, tab in TABS_BEHIND.items()),
     ]
     shown = [tab for tab in tabs if tab is not None]
-    layout = send_layout(stream, shown, timeline=FLIGHT_NUMBER)  # on utc, the flights of a year are columns of dots
+    # on utc, the flights of a year are columns of dots
+    own = send_layout(stream, shown, timeline=FLIGHT_NUMBER, saved=layout)
     held.release()
-    return layout
+    return own
 
 
 def _logged(recorder: FleetRecorder, fleet: FleetResults, one: ChartedAircraft) -> Logged | None:

@@ -13,7 +13,7 @@ import rerun as rr
 from rerun.chunk import Chunk, RrdReader
 
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
-from groundstation.viewer.file_contents import MAGIC, VIEWPORT, rerun_version, version_in
+from groundstation.viewer.file_contents import MAGIC, VIEWPORT, layout_of, rerun_version, version_in
 from groundstation.viewer.held_stream import FLUSH_SECONDS
 from groundstation.viewer.inner import new_blueprint, send_made
 from groundstation.viewer.verification import damaged
@@ -49,6 +49,12 @@ def read_layout(path: Path) -> bytes:
         if not any(chunk.entity_path == VIEWPORT for chunk in chunks):
             raise UsageError(where, "a blueprint without views", "one of a flight's recording", SAVE_IT)
     return content
+
+
+def roots_of(path: Path) -> frozenset[str]:
+    """Return the first parts of the entity paths that the views of a layout show."""
+    paths = (shown for tab in layout_of(path) for _name, listed in tab.views for shown in listed)
+    return frozenset(one.lstrip("/").partition("/")[0] for one in paths)
 
 
 @contextmanager

@@ -18,7 +18,9 @@ from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.recording import answer_tabs, save_stream, send_tabs, with_log
 
 
-def write_session_recording(path: Path, assembled: AssembledSession, results: FlightResults, systems: Systems) -> None:
+def write_session_recording(
+    path: Path, assembled: AssembledSession, results: FlightResults, systems: Systems, layout: bytes = b""
+) -> None:
     """Write the recording of a session, blueprint embedded.
 
     See :func:`recording.write_recording`.
@@ -32,17 +34,23 @@ def write_session_recording(path: Path, assembled: AssembledSession, results: Fl
     results : FlightResults
     systems : Systems
         Those whose tabs it has.
+    layout : bytes
+        A saved layout in place of the default one; empty: none.
 
     Raises
     ------
     GroundstationError
         When Rerun refused the data or the file could not be written.
     """
-    save_stream(path, results.flight_id, lambda stream: send_session(stream, assembled, results, systems))
+    save_stream(path, results.flight_id, lambda stream: send_session(stream, assembled, results, systems, layout))
 
 
 def send_session(
-    stream: rr.RecordingStream, assembled: AssembledSession, results: FlightResults, systems: Systems
+    stream: rr.RecordingStream,
+    assembled: AssembledSession,
+    results: FlightResults,
+    systems: Systems,
+    layout: bytes = b"",
 ) -> rrb.Blueprint:
     """Log everything to a stream that has its sink with its layout first; returns the layout."""
     held = HeldStream(stream)
@@ -53,4 +61,4 @@ def send_session(
         stream.send_recording_start_time_nanos(assembled.start_ns)
     clock = Flight({}, results.metadata, assembled.start_ns, assembled.has_utc)  # findings have places in time alone
     tabs = answer_tabs(SessionAnswer, recorder, results)
-    return send_tabs(stream, held, with_log(tabs, recorder, clock, results))
+    return send_tabs(stream, held, with_log(tabs, recorder, clock, results), layout)

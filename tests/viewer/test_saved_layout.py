@@ -11,15 +11,17 @@ import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
 from typer.testing import CliRunner
 
-from groundstation.base.errors import GroundstationError
+from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.cli.main import app
+from groundstation.pipeline.many_flights.sessions.job import SessionJob
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.pipeline.one_flight.layout import saved_layout
+from groundstation.pipeline.one_flight.layout import saved_layouts
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.resume import keys_of
 from groundstation.pipeline.verbs.describe import describe
 from groundstation.systems import systems
+from groundstation.tables.session_settings import Stations
 from groundstation.viewer import launch
 from groundstation.viewer.catalog_table import save_flight_table
 from groundstation.viewer.file_contents import MAGIC, layout_of, rerun_version
@@ -134,10 +136,54 @@ def test_another_layout_is_another_run(layout: Path, tmp_path: Path) -> None:
     rrb.Blueprint(rrb.TextDocumentView(origin="/summary"), auto_views=False).save("groundstation a", str(other))
     source = open_log(SHORT).source
     plain = Configuration()
-    keys = [keys_of(source, replace(plain, layout=saved_layout(path))) for path in (None, layout, other, layout)]
+    layouts = [saved_layouts([] if path is None else [path]) for path in (None, layout, other, layout)]
+    keys = [keys_of(source, replace(plain, layouts=one)) for one in layouts]
     assert len({one.conversion for one in keys}) == 1, "the MCAP stays"
     assert keys[1] == keys[3] and len({one.analysis for one in keys}) == 3
-    assert replace(plain, layout=saved_layout(layout)).to_dict() == {"layout": "mine.rbl"}
+    assert replace(plain, layouts=layouts[1]).to_dict() == {"layouts": {"flight": "mine.rbl"}}
+
+
+def of(kind: str, origin: str, folder: Path) -> Path:
+    """A layout of one page whose view shows an entity."""
+    path = folder / f"{kind}.rbl"
+    page = rrb.Vertical(contents=[rrb.TextDocumentView(origin=origin, name=kind)], name=f"My {kind}")
+    rrb.Blueprint(rrb.Tabs(page), auto_views=False).save("groundstation another", str(path))
+    return path
+
+
+def test_a_layout_is_of_the_kind_of_recording_it_was_saved_from(layout: Path, tmp_path: Path) -> None:
+    session, fleet = of("session", "/cooperative/answer", tmp_path), of("fleet", "/flights", tmp_path)
+    found = saved_layouts([layout, session, fleet])
+    assert {one.of: one.name for one in found} == {
+        "flight": "mine.rbl",
+        "session": "session.rbl",
+        "fleet": "fleet.rbl",
+    }
+    given = Configuration(layouts=found)
+    assert given.layout_bytes("fleet") == fleet.read_bytes()
+    assert Configuration(layouts=found[:1]).layout_bytes("session") == b""
+    source = open_log(SHORT).source
+    alone = keys_of(source, Configuration(layouts=found[:1]))
+    assert keys_of(source, given) == alone, "flights are not made again for the layout of another kind"
+    job = SessionJob((), Stations(), tmp_path, given)
+    without = SessionJob((), Stations(), tmp_path, Configuration(layouts=found[:1]))
+    assert job.keys().conversion == without.keys().conversion and job.keys().analysis != without.keys().analysis
+    with pytest.raises(UsageError, match="both of a flight"):
+        saved_layouts([layout, of("flight", "/summary", tmp_path)])
+
+
+def test_run_lays_out_flights_and_fleet_each_by_its_own(layout: Path, tmp_path: Path) -> None:
+    out, fleet = tmp_path / "out", of("fleet", "/flights", tmp_path)
+    asked = ["run", str(SHORT), "-o", str(out), "--layout", str(layout), "--layout", str(fleet), "-q"]
+    result = CliRunner().invoke(app, asked)
+    assert result.exit_code == 0, result.stderr
+    (flight,) = out.glob("*/*.rrd")
+    assert [tab.name for tab in layout_of(flight)] == ["Mine"]
+    assert [tab.name for tab in layout_of(out / "fleet.rrd")] == ["My fleet"]
+    written = flight.stat().st_mtime_ns
+    result = CliRunner().invoke(app, [*asked[:6], "-q"])
+    assert result.exit_code == 0 and flight.stat().st_mtime_ns == written
+    assert "My fleet" not in [tab.name for tab in layout_of(out / "fleet.rrd")], "without a layout its own again"
 
 
 def test_view_opens_a_copy_with_it(

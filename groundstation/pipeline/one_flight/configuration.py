@@ -16,7 +16,7 @@ from groundstation.base.toml_settings import settings_from
 from groundstation.base.toml_text import toml_table, toml_text
 from groundstation.integrity.limits import Thresholds, thresholds_from
 from groundstation.pipeline.one_flight.isolation import Isolation
-from groundstation.pipeline.one_flight.layout import SavedLayout
+from groundstation.pipeline.one_flight.layout import KindOfRecording, SavedLayout
 
 if TYPE_CHECKING:
     from groundstation.results.installations import Lesson
@@ -145,8 +145,8 @@ class Configuration:
         What earlier flights say of installations, from an installations.json.
     without : tuple of str
         Analyses that are left out.
-    layout : SavedLayout, optional
-        What the recording of each flight shows in place of the default tabs.
+    layouts : tuple of SavedLayout
+        What the recordings show in place of the default tabs, at most one for each kind of recording.
 
     Raises
     ------
@@ -165,7 +165,7 @@ class Configuration:
     weather: tuple[str, ...] = ()
     lessons: "tuple[Lesson, ...] | None" = None
     without: tuple[str, ...] = ()
-    layout: SavedLayout | None = None
+    layouts: tuple[SavedLayout, ...] = ()
 
     def __post_init__(self) -> None:
         self.thresholds  # noqa: B018 -- raises now if a value is wrong
@@ -222,6 +222,15 @@ class Configuration:
         """The profile as a path."""
         return Path(self.profile) if self.profile else None
 
+    def layout_of(self, kind: KindOfRecording) -> SavedLayout | None:
+        """Return the saved layout of a kind of recording; None where it keeps its own."""
+        return next((one for one in self.layouts if one.of == kind), None)
+
+    def layout_bytes(self, kind: KindOfRecording) -> bytes:
+        """Content of the saved layout of a kind of recording; empty where it keeps its own."""
+        found = self.layout_of(kind)
+        return b"" if found is None else found.content
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for the manifest and the MCAP; only what the user set."""
         document: dict[str, Any] = {name: dict(self.tables[name]) for name in tables() if self.tables.get(name)}
@@ -239,8 +248,8 @@ class Configuration:
             document["weather"] = list(self.weather)
         if self.without:
             document["without"] = list(self.without)
-        if self.layout:
-            document["layout"] = self.layout.name
+        if self.layouts:
+            document["layouts"] = {one.of: one.name for one in self.layouts}
         if self.references.paths:
             document["references"] = [path.name for path in self.references.paths]
         return document

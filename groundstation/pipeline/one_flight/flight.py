@@ -249,7 +249,7 @@ def _show(partial: Path, flight: Flight, results: FlightResults, job: Job, watch
         from groundstation.viewer.recording import write_recording
 
         path = partial / f"{results.flight_id}.rrd"
-        layout = b"" if job.configuration.layout is None else job.configuration.layout.content
+        layout = job.configuration.layout_bytes("flight")
         attempt("recording", "flight", write_recording, path, flight, results, systems(), layout, unless=OF_THE_WORLD)
     with watch.stage("reporting"):
         return write_flight_report(partial, systems(), with_pdf=job.with_pdf).problem

@@ -183,7 +183,7 @@ def keys_of(source: Source, configuration: Configuration, *, digests: Sequence[s
     apply = None if configuration.apply is None else asdict(configuration.apply)
     lessons = [] if configuration.lessons is None else [[asdict(one) for one in configuration.lessons]]
     left_out = [list(configuration.without)] if configuration.without else []
-    layout = [configuration.layout.sha256] if configuration.layout is not None else []
+    layout = [] if (saved := configuration.layout_of("flight")) is None else [saved.sha256]
     runways, problem = usable_runways()
     analysis = digest_of_parts(
         *(conversion, tables, intervals, apply, configuration.weather, *lessons, *left_out, *layout),

@@ -4,6 +4,7 @@ import os
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError, UsageError
@@ -73,7 +74,8 @@ def look_at(
     else:
         with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
             say(f"computing {path.name} ...")
-            configuration = Configuration(profile=str(profile) if profile else None, layout=saved)
+            layouts = () if saved is None else (replace(saved, of="flight"),)
+            configuration = Configuration(profile=str(profile) if profile else None, layouts=layouts)
             outcome = run_flight(Job(path, Path(folder), configuration, power_up=power_up))
             if outcome.state == "failed":
                 where, _, found = outcome.text.partition(": ")

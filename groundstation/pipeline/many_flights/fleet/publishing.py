@@ -49,6 +49,7 @@ def write_beside(
     only_results: bool = False,
     found: Scan | None = None,
     remade: Sequence[str] | None = None,
+    layout: bytes = b"",
 ) -> tuple[Outcome, ...]:
     """Write everything that stands beside the flight folders.
 
@@ -57,6 +58,7 @@ def write_beside(
     ``found`` is what :func:`~groundstation.pipeline.many_flights.fleet.refresh.refresh` gave, where it was called.
     With ``only_results`` the page and the recording of all flights are removed: they would tell of an earlier run.
     ``remade`` are the flights whose reports are new; left out: those of ``outcomes`` that were not finished before.
+    ``layout`` is a saved one for the recording of all flights, in place of its own.
     """
     problems: list[Outcome] = []
     if remade is None:
@@ -72,7 +74,7 @@ def write_beside(
                     learn = partial(refresh_installations, out, found, remade)
                     shown = attempt("installations", "fleet", learn, unless=(OSError, GroundstationError))
                     restamp(out, shown or ())
-                    problems += _write_beside(out, outcomes, kept_rows, found, with_pdf, only_results)
+                    problems += _write_beside(out, outcomes, kept_rows, found, with_pdf, only_results, layout)
                     problems += [outcome_beside(out, "failed", f"{out}: {one.text}", one.trace) for one in failures()]
                     break
                 except DamagedMonthError as error:
@@ -95,6 +97,7 @@ def _write_beside(
     found: Scan,
     with_pdf: bool,
     only_results: bool,
+    layout: bytes,
 ) -> list[Outcome]:
     """Write index, fleet, page and recording of the flights as they were found.
 
@@ -110,7 +113,7 @@ def _write_beside(
     from groundstation.viewer.fleet import write_fleet_recording
 
     recording = out / FLEET_RECORDING
-    write = partial(write_fleet_recording, recording, fleet, systems())
+    write = partial(write_fleet_recording, recording, fleet, systems(), layout)
     attempt("recording", "fleet", write, unless=(OSError, GroundstationError))
     problem = write_fleet_report(out, fleet, systems(), with_pdf=with_pdf).problem
     return [*problems, outcome_beside(out, "skipped", f"{out}: {problem}")] if problem else problems

@@ -248,12 +248,19 @@ def _run_here(
         sessions = _run_sessions(destination, asked, found, crew, listen)
         outcomes = (*destination.outcomes(), *sessions)
         found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
-        problems = write_beside(out, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results, found=found)
+        problems = _beside(out, outcomes, asked, found)
         sync_folder(out)
         stored = put_flights(asked.store, found, outcomes) if asked.store else ()
         if asked.configuration.lessons is None:  # else the answer by the file is told
             outcomes = told(outcomes, out)
         return (*outcomes, *apart, *unwritten, *problems, *stored)
+
+
+def _beside(out: Path, outcomes: Sequence[Outcome], asked: SessionOptions, found: Scan) -> tuple[Outcome, ...]:
+    """Write what stands beside the flight folders, as asked for."""
+    layout = asked.configuration.layout_bytes("fleet")
+    with_pdf, only_results = asked.with_pdf, asked.only_results
+    return write_beside(out, outcomes, with_pdf=with_pdf, only_results=only_results, found=found, layout=layout)
 
 
 def _run_joined(
@@ -345,9 +352,7 @@ def _run_remote(
                 sessions = _run_remote_sessions(destination, output, asked, found, listen)
                 outcomes = (*destination.outcomes(), *sessions)
                 found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
-                beside = write_beside(
-                    copy, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results, found=found
-                )
+                beside = _beside(copy, outcomes, asked, found)
                 stored = put_flights(asked.store, found, outcomes) if asked.store else ()
                 problems = (*unwritten, *beside, *stored)
                 outcomes = told(outcomes, copy)

@@ -84,7 +84,9 @@ class SessionJob:
         used = {name: tables.get(name, {}) for name in session_tables()}
         layouts = [layouts_of(log.source, self.configuration) for log in self.logs]
         conversion = digest_of_parts(logs, thresholds, layouts, dict(versions()), platform.python_version())
-        analysis = digest_of_parts(conversion, asdict(self.stations), used, [asdict(note) for note in self.notes])
+        layout = [] if (saved := self.configuration.layout_of("session")) is None else [saved.sha256]
+        notes = [asdict(note) for note in self.notes]
+        analysis = digest_of_parts(conversion, asdict(self.stations), used, notes, *layout)
         return Keys(conversion, analysis)
 
 

@@ -139,9 +139,9 @@ def _show(partial: Path, assembled: AssembledSession, results: FlightResults, jo
         from groundstation.viewer.session import write_session_recording
 
         path = partial / f"{results.flight_id}.rrd"
-        attempt(
-            "recording", "session", write_session_recording, path, assembled, results, systems(), unless=OF_THE_WORLD
-        )
+        layout = job.configuration.layout_bytes("session")
+        given = (path, assembled, results, systems(), layout)
+        attempt("recording", "session", write_session_recording, *given, unless=OF_THE_WORLD)
     with watch.stage("reporting"):
         return write_flight_report(partial, systems(), with_pdf=job.with_pdf).problem
 
