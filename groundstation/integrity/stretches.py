@@ -57,9 +57,12 @@ class Constancy:
     ----------
     samples, changes : int
         Finite samples so far, and how many of them differ from the one before.
+
+    ``has_steps`` false: nobody asks for the resolution, and it stays 0.
     """
 
-    def __init__(self, min_samples: int) -> None:
+    def __init__(self, min_samples: int, has_steps: bool = True) -> None:
+        self._has_steps = has_steps
         self.samples = self.changes = 0
         self._step = self._smallest = 0.0
         self._min_samples = min_samples
@@ -94,7 +97,7 @@ class Constancy:
             self._keep(self._open)
         self._keep(found[:-1])
         self._open = found[-1:]
-        if 0 < changes < count - 1:
+        if self._has_steps and 0 < changes < count - 1:
             at = np.flatnonzero(differs)[:CHANGES_MEASURED]
             with np.errstate(over="ignore", invalid="ignore"):  # from one end of a float to the other, or no numbers
                 smallest = float(np.abs(values[at + 1] - values[at]).min())
