@@ -18,7 +18,7 @@ from groundstation.integrity.pauses import Arming, armings_in
 from groundstation.integrity.sequence import Counter, Sequence, counters_of
 from groundstation.integrity.spans import RecorderDropout, Timeline
 from groundstation.integrity.stretches import Constancy, RecordPlace, Sampler
-from groundstation.integrity.stuck import Judge, MotionSampler, StuckPlace, is_watched
+from groundstation.integrity.stuck import Judge, MotionSampler, StuckPlace, watch
 
 FloatArray = NDArray[np.float64]
 
@@ -152,7 +152,7 @@ class Contents:
         if found is None:
             known = self._thresholds.range_of(topic, name)
             low, high = known or (float("-inf"), float("inf"))
-            constancy = Constancy(self._thresholds.stuck.min_samples) if is_watched(topic, name) else None
+            constancy = watch(topic, name, self._thresholds.stuck)
             found = tally.fields[name] = _FieldTally(low, high, known is not None, constancy)
         return found
 

@@ -56,9 +56,12 @@ class Constancy:
     ----------
     samples, changes : int
         Finite samples so far, and how many of them differ from the one before.
+
+    ``has_steps`` false: nobody asks for the resolution, and it stays 0.
     """
 
-    def __init__(self, min_samples: int) -> None:
+    def __init__(self, min_samples: int, has_steps: bool = True) -> None:
+        self._has_steps = has_steps
         self.samples = self.changes = 0
         self._step = self._smallest = 0.0
         self._min_samples = min_samples
@@ -83,7 +86,8 @@ class Constancy:
         else:
             borders = np.flatnonzero(differs) + 1
             starts, ends = _ends_and_long(borders, count, self._min_samples)
-            self._measure(values, differs, borders[:CHANGES_MEASURED])
+            if self._has_steps:
+                self._measure(values, differs, borders[:CHANGES_MEASURED])
         first, last = (starts, ends - 1) if rows is None else (rows[starts], rows[ends - 1])
         found = np.empty(len(starts), dtype=_STRETCH)
         found["first_index"], found["first_ns"] = record_index[first], device_ns[first]

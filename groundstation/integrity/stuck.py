@@ -56,9 +56,11 @@ class StuckPlace:
     why: str
 
 
-def is_watched(topic: str, name: str) -> bool:
-    """Tell whether a field may be found stuck."""
-    return name in WATCHED and kind_of(topic) in _KINDS
+def watch(topic: str, name: str, limits: StuckLimits) -> Constancy | None:
+    """Return what measures how a field stands still; None of one that is never found stuck."""
+    if name not in WATCHED or kind_of(topic) not in _KINDS:
+        return None
+    return Constancy(limits.min_samples, has_steps=name not in _NOISY)
 
 
 def _shared(one: ConstantStretch, other: ConstantStretch) -> ConstantStretch | None:
