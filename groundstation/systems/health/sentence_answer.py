@@ -92,14 +92,21 @@ def told(checks: Sequence[Check], loss: AttitudeLoss | None = None) -> str:
 def told_apart(checks: Sequence[Check], loss: AttitudeLoss | None = None) -> tuple[str, tuple[str, ...]]:
     """Return what failed first, and when, and the rest of the sentence in parts.
 
-    The rest is all else that is bad, then what is good. Without a failure the first is what warns, else what is good.
+    Before the first stands one that lasted throughout. The rest is all else that is bad, then what is good. Without a
+    failure the first is what warns, else what is good.
     """
     bad = sorted((one for one in checks if one.is_bad), key=gravity)
     parts = [part for part in _by_time(bad, loss) if part]
-    begins = next((part for part in parts if part.startswith(BEGINS)), parts[0] if parts else "")
     good = ", ".join(_of_the_first(checks))
-    rest = [part for part in parts if part != begins] + ([good] if good and begins else [])
-    return _capital(begins or good), tuple(map(_capital, rest))
+    failed = [one for one in bad if one.verdict == "fail"]
+    timed = [one for one in failed if when(one) not in ("", THROUGHOUT)]
+    first_s = min((one.begins_s or 0.0 for one in timed), default=0.0)
+    first = [_part(one, loss) for one in timed if (one.begins_s or 0.0) - first_s < APART_S][:1]
+    first = [part for part in parts if part.startswith(BEGINS)] or first
+    lasting = [_part(one) for one in failed if one not in timed][:1]
+    head = [part for part in (*lasting, *first) if part] or parts[:1]
+    rest = [part for part in parts if part not in head] + ([good] if good and head else [])
+    return _capital("; ".join(head) or good), tuple(map(_capital, rest))
 
 
 def _of_the_first(checks: Sequence[Check]) -> list[str]:

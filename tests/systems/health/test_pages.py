@@ -8,8 +8,10 @@ import pytest
 from groundstation.chapters.markdown import markdown
 from groundstation.plots.marks import Curve, Lanes, Limit
 from groundstation.results.flight import FlightResults
+from groundstation.systems.health.answer import Check
 from groundstation.systems.health.chapter import health
 from groundstation.systems.health.plots import PLOTS
+from groundstation.systems.health.sentence_answer import told_apart
 from tests.report_example import example
 from tests.systems.health.made import table
 from tests.systems.health.test_px4 import TIME, answered, during, new
@@ -49,3 +51,20 @@ def test_the_chapter_opens_with_what_failed(results: FlightResults) -> None:
     assert section.claim.headline == section.headline == "Vibration high 0:40-1:00"
     assert section.claim.sentences[0].startswith("GNSS good, filter healthy")
     assert "Not logged" in markdown(section)
+
+
+def test_a_failure_throughout_stands_before_the_first_that_has_a_time() -> None:
+    shaken = table("raw.vehicle_imu_status", TIME, accel_vibration_metric=34.4, delta_angle_coning_metric=1e-9)
+    found = answered(*(one for one in new() if "imu_status" not in one.topic), shaken)
+    lasting = found.check("vibration")
+    battery = Check("battery", "battery", "fail", "voltage critical; 9.1 V", (), first_event_s=79.0)
+    late = Check("faults", "faults", "fail", "failsafe", (), first_event_s=85.0)
+    doubt = Check("timing", "timing", "warn", "CPU", (), first_event_s=20.0)
+    assert lasting.verdict == "fail"
+    first, rest = told_apart((lasting, battery, doubt))
+    assert first == "Vibration high throughout; “voltage critical” at 1:19"
+    assert rest == ("Timing or log with losses at 0:20",)
+    first, rest = told_apart((battery, late, doubt))
+    assert first == "First: “voltage critical” at 1:19.0" and rest[0] == "Then “failsafe” at 1:25.0"
+    assert told_apart((doubt,))[0] == "Timing or log with losses at 0:20"
+    assert told_apart((found.check("gnss"),)) == ("GNSS good", ())
