@@ -65,7 +65,6 @@ def gnss_lanes(flight: Flight, geometry_limit: float) -> GnssLanes | None:
     if topic is None:
         return None
     table = flight[topic]
-    time_s = flight.time_s(topic)
     name = next((factor for factor in ("gdop", "pdop", "hdop") if table.has(factor)), None)
     states = np.full(len(table), "good" if name else "no geometry factor", dtype="U24")
     if name:
@@ -74,7 +73,8 @@ def gnss_lanes(flight: Flight, geometry_limit: float) -> GnssLanes | None:
         states[factor > geometry_limit] = f"{name} > {geometry_limit:g}"
     if table.has("integrity_ok"):
         states[table.values("integrity_ok") == 0.0] = "integrity lost"
-    step_s = np.diff(flight.seconds(logged_ns(table.time_ns, flight.pauses)))
+    time_ns, states = _with_ends_of_pauses(table.time_ns, states, flight)
+    time_s, step_s = flight.seconds(time_ns), np.diff(flight.seconds(logged_ns(time_ns, flight.pauses)))
     if len(step_s):
         limit_s = max(GAP_PERIODS * float(np.median(step_s)), LARGEST_QUIET_GAP_S)
         after = np.flatnonzero(step_s > limit_s)
@@ -88,6 +88,20 @@ def gnss_lanes(flight: Flight, geometry_limit: float) -> GnssLanes | None:
             state=np.r_[lanes.state, np.array([NO_GNSS])],
         )
     return _paused(lanes, flight)
+
+
+def _with_ends_of_pauses(
+    time_ns: Int64Array, states: NDArray[np.str_], flight: Flight
+) -> tuple[Int64Array, NDArray[np.str_]]:
+    """Return times and states with a row at either end of each pause of the log.
+
+    It has the state of the row beside it, so that a gap ends where a pause begins.
+    """
+    inside = [one for one in flight.pauses if len(time_ns) and time_ns[0] <= one.start_ns and one.end_ns < time_ns[-1]]
+    at = np.array([np.searchsorted(time_ns, one.start_ns, side="right") for one in inside], dtype=np.intp)
+    beside = np.column_stack((states[at - 1], states[at])).ravel()
+    edges = np.array(inside, dtype=np.int64).ravel()
+    return np.insert(time_ns, np.repeat(at, 2), edges), np.insert(states, np.repeat(at, 2), beside)
 
 
 def _paused(lanes: GnssLanes, flight: Flight) -> GnssLanes:
