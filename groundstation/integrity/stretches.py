@@ -166,7 +166,7 @@ def _step_between_held(values: FloatArray, differs: BoolArray, changed: Int64Arr
 
 
 def _ends_and_long(borders: Int64Array, count: int, min_samples: int) -> tuple[Int64Array, Int64Array]:
-    """Return starts and ends of the first, the last and the long stretches of ``count`` samples.
+    """Return starts and ends of the first, the last and the long of ``count`` samples' stretches.
 
     ``borders`` are the samples that differ from the one before.
     """
