@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from groundstation.base.ledger import DamageEntry, FieldEntry, Ledger, TopicEntry, TopicGaps, Truncation
+from groundstation.base.ledger import DamageEntry, FieldEntry, Ledger, PauseEntry, TopicEntry, TopicGaps, Truncation
 from groundstation.chapters.front import front
 from groundstation.chapters.parts import Mark, Rank
 from groundstation.results.flight import FlightResults
@@ -91,3 +91,11 @@ def test_too_little_taxi_decides_nothing() -> None:
     short = Gate("taxi_seconds", "straight taxi", 3.0, 20.0, "s", "failed", sense="at_least")
     assert claim(heading_result(verdict="reject", gates=(short,))).rank is Rank.HEADING_OPEN
     assert claim(heading_result(verdict="reject")).rank is Rank.HEADING
+
+
+def test_a_pause_while_disarmed_is_told_apart_from_losses_and_is_no_recorded_time() -> None:
+    whole = flight(gnss=topic(5.0, 80.0, "latitude_deg"))
+    pause = PauseEntry(length_s=21.2, start="", start_s=9.2)
+    paused = replace(whole, ledger=replace(whole.ledger, pauses=(pause,)))
+    assert contents(whole) == "80 s of GNSS at 5 Hz" and contents(paused) == "59 s of GNSS at 5 Hz"
+    assert wholeness(paused) == "nothing lost; nothing logged for 21 s while disarmed"

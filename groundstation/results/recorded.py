@@ -52,6 +52,7 @@ def contents(results: FlightResults) -> str:
     if not kinds:
         return _raw(results)
     length = max((one.span_s for name, one in ledger.topics.items() if is_canonical(name)), default=0.0)
+    length = max(length - _paused_s(ledger), 0.0)
     shown = ", ".join(_by_rate(kinds[:MOST_NAMED]))
     more = len(kinds) - MOST_NAMED
     also = f", beside {more} more" if more > 0 else ""
@@ -166,8 +167,11 @@ def _gaps(ledger: Ledger) -> str:
 
 def _pauses(ledger: Ledger) -> str:
     """Return the time that was left out on purpose; empty where there is none."""
-    paused_s = sum(one.length_s for one in ledger.pauses)
-    return f"nothing logged for {_length(paused_s)} while disarmed" if ledger.pauses else ""
+    return f"nothing logged for {_length(_paused_s(ledger))} while disarmed" if ledger.pauses else ""
+
+
+def _paused_s(ledger: Ledger) -> float:
+    return sum(one.length_s for one in ledger.pauses)
 
 
 def _longest(count: int, longest_s: float) -> str:

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,8 @@ from groundstation.integrity.ledger import LedgerCounts, gaps_of
 from groundstation.integrity.ledger_findings import ledger_findings
 from groundstation.integrity.ordering import corrected
 from groundstation.integrity.survey import Census, survey
+from groundstation.pipeline.one_flight.log import open_log
+from tests.readers.dataflash_writer import flight_log
 
 RATES_HZ = {"ins": 50.0, "gnss": 5.0, "baro": 10.0, "raw.ATT": 50.0, "raw.SLOW": 0.2}
 DISARMED, ARMED = (40.0, "disarmed"), (70.0, "armed")
@@ -184,3 +187,15 @@ def test_logged_time_stands_still_in_pauses() -> None:
     time_ns = np.array([0, 1, 2, 9, 10, 11]) * NS_PER_S
     assert len(gaps_of("ins", time_ns)) == 1
     assert not len(gaps_of("ins", time_ns, pauses=(Pause(2 * NS_PER_S, 9 * NS_PER_S),)))
+
+
+@pytest.mark.parametrize("has_events", [True, False])
+def test_an_ardupilot_log_that_pauses_while_disarmed(tmp_path: Path, has_events: bool) -> None:
+    path = tmp_path / "a.BIN"
+    path.write_bytes(b"".join(flight_log(60, range(20, 40), has_events=has_events).records))
+    ledger = survey(open_log(path).items()).ledger
+    (silence,) = ledger.pauses if has_events else ledger.stops
+    assert silence.length_s == pytest.approx(20.0, abs=0.1)
+    code = ("data.not_logged", "info", "") if has_events else ("data.silent", "warn", "")
+    assert told(ledger) == [code] and not ledger.loses_data
+    assert ledger["gnss"].coverage == pytest.approx(1.0 if has_events else 2.0 / 3.0, abs=0.01)

@@ -101,8 +101,11 @@ UNITS |= {"#": "instance", "-": "", "h": "degheading", "o": "m/s/s", "A": "A"}
 MULTIPLIERS = {"-": 0.0, "0": 1.0, "B": 1e-2, "C": 1e-3, "F": 1e-6, "G": 1e-7}
 
 
-def flight_log(seconds: int = 4) -> DataFlash:
-    """A log of today's layout: IMU 20 Hz with two instances, ATT, EKF, POS 5 Hz, GPS 2 Hz."""
+def flight_log(seconds: int = 4, disarmed: range = range(0), *, has_events: bool = True) -> DataFlash:
+    """A log of today's layout: IMU 20 Hz with two instances, ATT, EKF, POS 5 Hz, GPS 2 Hz.
+
+    Nothing is written in the seconds ``disarmed``, but the events at their ends.
+    """
     log = DataFlash()
     log.define_units(UNITS, MULTIPLIERS)
     log.define(1, "PARM", "QNff", "TimeUS,Name,Value,Default")
@@ -125,8 +128,13 @@ def flight_log(seconds: int = 4) -> DataFlash:
     log.write("MSG", 1_000_000, "ArduPlane V4.5.7 (0358a9c2)")
     for name, value in (("AHRS_EKF_TYPE", 3.0), ("COMPASS_AUTODEC", 1.0), ("COMPASS_DEC", 0.1), ("RC1_MIN", 1100.0)):
         log.write("PARM", 1_000_100, name, value, value)
+    if disarmed:
+        log.define(11, "EV", "QB", "TimeUS,Id")
     for tick in range(20 * seconds):
-        _tick(log, tick)
+        if has_events and tick in (20 * disarmed.start, 20 * disarmed.stop) and disarmed:
+            log.write("EV", 1_100_000 + tick * 50_000 - 60, 11 if tick == 20 * disarmed.start else 10)
+        if tick // 20 not in disarmed:
+            _tick(log, tick)
     return log
 
 

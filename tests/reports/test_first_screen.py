@@ -15,7 +15,7 @@ OPENS = {
         "bad",
         "Failed",
         "control of attitude lost 1:17.6-1:20.5 with output 2 suspect",
-        "21 s of GNSS missing",
+        "nothing logged for 21 s while disarmed",
     ),
     "dataflash/plane_4.2.3_pilot0004.BIN": ("bad", "Failed", "GNSS bad throughout", "GNSS at 5 Hz"),
     "ulog/px4_rs_esc_status.ulg": ("warn", "Warnings", "Vibration raised 0:12", "40 s of GNSS"),
