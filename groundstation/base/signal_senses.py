@@ -53,7 +53,7 @@ SENSES: tuple[tuple[str, tuple[str, ...], str], ...] = (
     (
         "gnss",
         ("integrity_ok", "fix"),
-        "the receiver vouches for it; none, 2d, 3d, dgnss, rtk_float, rtk_fixed, ppp, gnss_ins, dead_reckoning, other",
+        "vouched for by the receiver; none, 2d, 3d, dgnss, rtk_float, rtk_fixed, ppp, gnss_ins, dead_reckoning, other",
     ),
     ("gnss", ("cn0_dbhz", "age_of_corrections_s"), "mean carrier to noise density; differential corrections"),
     (
