@@ -134,9 +134,9 @@ class Constancy:
 
 
 def _ends_and_long(borders: Int64Array, count: int, min_samples: int) -> tuple[Int64Array, Int64Array]:
-    """Return starts and ends of the first, the last and the long stretches of ``count`` samples.
+    """Return starts and ends of the first, the last and the long stretches of samples.
 
-    ``borders`` are the samples that differ from the one before.
+    ``borders`` are those of the ``count`` samples that differ from the one before.
     """
     if not len(borders):
         return np.array([0]), np.array([count])
