@@ -166,9 +166,9 @@ def _step_between_held(values: FloatArray, differs: BoolArray, changed: Int64Arr
 
 
 def _ends_and_long(borders: Int64Array, count: int, min_samples: int) -> tuple[Int64Array, Int64Array]:
-    """Return starts and ends of the first, the last and the long of ``count`` samples' stretches.
+    """Return starts and ends of the first, the last and the long stretches of samples.
 
-    ``borders`` are the samples that differ from the one before.
+    ``borders`` are those of the ``count`` samples that differ from the one before.
     """
     if not len(borders):
         return np.array([0]), np.array([count])

@@ -4,17 +4,17 @@ Chunks go to a spool as they fill, and into the file in order of time when all a
 """
 
 import glob
-import hashlib
 import os
 import re
 import tempfile
 import zlib
 from collections import Counter, deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from threading import local
 from types import TracebackType
 from typing import Any, BinaryIO, Self
 
@@ -41,6 +41,7 @@ from groundstation.base.to_disk import sync_folder, sync_open
 from groundstation.base.version import __version__
 from groundstation.store.channel import ChannelWriter, Chunk, Pace, TopicWriter
 from groundstation.store.derived import LOG_TOPIC, LocationFixWriter, LogWriter, Origin, PoseWriter
+from groundstation.store.digested import DigestedFile
 from groundstation.store.framing import chunk_head, message_index, to_bytes
 from groundstation.store.info import COPY_NAME, StoreInfo
 from groundstation.store.marks import MAGIC, METADATA_NAME, PACKAGE
@@ -49,7 +50,8 @@ LIBRARY = f"groundstation {__version__}"
 # Higher levels save 4 to 7 % of recorded flights and read random mantissas a quarter slower: docs/decisions/007.
 ZSTD_LEVEL = -1
 MEMORY_BYTES = 32 << 20  # finished chunks kept in memory; when there are more, all go to the spool
-MOST_ON_THEIR_WAY = 4  # chunks that wait for the thread which compresses and writes them
+COMPRESSING = min(2, os.cpu_count() or 1)  # threads that compress; the one that encodes waits for them when it is ahead
+MOST_ON_THEIR_WAY = 4  # chunks that wait for those threads
 PART = ".part"  # end of the name of a file that is being written
 MAX_CHANNELS = 65_535  # MCAP's channel ids have 16 bits
 
@@ -65,35 +67,7 @@ class _Finished:
     place: int
     nbytes: int
     topic: str
-    ordinal: int
     index: ChunkIndex
-
-
-class _Digested:
-    """File that is written from beginning to end, with a digest of its content."""
-
-    def __init__(self, file: BinaryIO) -> None:
-        self._file, self._digest, self._at = file, hashlib.sha256(), 0
-
-    @property
-    def sha256(self) -> str:
-        """SHA-256 of all that was written, hexadecimal."""
-        return self._digest.hexdigest()
-
-    def tell(self) -> int:
-        """Bytes written."""
-        return self._at
-
-    def write(self, data: bytes) -> None:
-        """Write bytes at the end."""
-        self._file.write(data)
-        self._digest.update(data)
-        self._at += len(data)
-
-    def writelines(self, parts: Iterable[bytes]) -> None:
-        """Write several parts at the end."""
-        for part in parts:
-            self.write(part)
 
 
 class StoreWriter:
@@ -101,8 +75,8 @@ class StoreWriter:
 
     The file appears under its name when the ``with`` block ends without an exception; until then its chunks are in
     memory, or, beyond ``MEMORY_BYTES``, in an unnamed temporary file of the same folder. Chunks stand in order of their
-    first log time whatever the order in which topics were written; equal input gives equal bytes. A thread compresses
-    one chunk after the other while the next ones are encoded.
+    first log time whatever the order in which topics were written; equal input gives equal bytes. Threads compress
+    chunks while the next ones are encoded.
 
     Parameters
     ----------
@@ -133,12 +107,12 @@ class StoreWriter:
         self._origin = Origin()
         self._pace = Pace()
         self._names: set[str] = set()
-        self._compressor = zstandard.ZstdCompressor(level=ZSTD_LEVEL)
+        self._compressors = local()  # one for each thread
         self._chunks: list[_Finished] = []
         self._bytes = self._spooled = 0  # bytes of all of them; how many are in the spool
         self._spool: BinaryIO | None = None
-        self._thread = ThreadPoolExecutor(1, "store")
-        self._on_their_way: deque[Future[None]] = deque()
+        self._threads = ThreadPoolExecutor(COMPRESSING, "store")
+        self._on_their_way: deque[Future[_Finished]] = deque()
 
     def __enter__(self) -> Self:
         with self._failing_in_one_line():
@@ -158,7 +132,7 @@ class StoreWriter:
                     self._write_log()
                     self._wait_until_left(0)
                     with part.open("wb") as file:
-                        told = _Digested(file)
+                        told = DigestedFile(file, self._threads)
                         self._finish(told)
                         file.flush()
                         sync_open(file.fileno(), self.path)
@@ -166,7 +140,7 @@ class StoreWriter:
                     sync_folder(self.path.parent)
                     self.sha256 = told.sha256
         finally:
-            self._thread.shutdown(cancel_futures=True)
+            self._threads.shutdown(cancel_futures=True)
             self._spool.close()
             part.unlink(missing_ok=True)
 
@@ -237,24 +211,26 @@ class StoreWriter:
         return name
 
     def _hand_over(self, chunk: Chunk) -> None:
-        """Let the thread spool a chunk.
+        """Let a thread compress a chunk.
 
         Waits while too many are on their way, and raises what went wrong with those.
         """
-        self._on_their_way.append(self._thread.submit(self._spool_chunk, chunk))
+        self._on_their_way.append(self._threads.submit(self._compressed, chunk))
         self._wait_until_left(MOST_ON_THEIR_WAY)
 
     def _wait_until_left(self, count: int) -> None:
+        """Keep the compressed chunks, in the order in which they were handed over."""
         while len(self._on_their_way) > count:
-            self._on_their_way.popleft().result()
+            self._keep(self._on_their_way.popleft().result())
 
-    def _spool_chunk(self, chunk: Chunk) -> None:
-        """Compress a chunk and write it to the spool; in the thread, chunk after chunk."""
-        assert self._spool is not None
+    def _compressed(self, chunk: Chunk) -> _Finished:
+        """Compress a chunk; in one of the threads."""
+        if not hasattr(self._compressors, "own"):
+            self._compressors.own = zstandard.ZstdCompressor(level=ZSTD_LEVEL)
         buffer, log_time, starts = (_joined(parts) for parts in (chunk.buffers, chunk.log_times, chunk.starts))
         start, end = int(log_time[0]), int(log_time[-1])
         raw = buffer.data
-        data = self._compressor.compress(raw)
+        data: bytes = self._compressors.own.compress(raw)
         head = chunk_head(start, end, len(raw), zlib.crc32(raw), len(data))
         length = len(head) + len(data)
         messages = message_index(chunk.channel_id, log_time, starts)
@@ -269,9 +245,13 @@ class StoreWriter:
             compressed_size=len(data),
             uncompressed_size=len(raw),
         )
-        nbytes = length + len(messages)
-        self._chunks.append(_Finished((head, data, messages), 0, nbytes, chunk.topic, len(self._chunks), index))
-        self._bytes += nbytes
+        return _Finished((head, data, messages), 0, length + len(messages), chunk.topic, index)
+
+    def _keep(self, chunk: _Finished) -> None:
+        """Keep a compressed chunk in memory; all go to the spool when they are many."""
+        assert self._spool is not None
+        self._chunks.append(chunk)
+        self._bytes += chunk.nbytes
         if self._bytes > MEMORY_BYTES:
             for one in self._chunks[self._spooled :]:
                 one.place = self._spool.tell()
@@ -279,7 +259,7 @@ class StoreWriter:
                 one.parts = ()
             self._spooled = len(self._chunks)
 
-    def _finish(self, file: _Digested) -> None:
+    def _finish(self, file: DigestedFile) -> None:
         """Write the whole file: definitions, chunks, facts again, summary."""
         definitions = [channel.definition(self.info.metadata) for channel in self._channels.values() if channel.count]
         schemas: list[McapRecord] = [schema for schema, _ in definitions]
@@ -311,7 +291,7 @@ class StoreWriter:
         ]
         file.write(_summary(groups, file.tell()) + MAGIC)
 
-    def _copy_chunk(self, file: _Digested, chunk: _Finished) -> ChunkIndex:
+    def _copy_chunk(self, file: DigestedFile, chunk: _Finished) -> ChunkIndex:
         """Copy a chunk from the spool; return its index with its new places."""
         assert self._spool is not None
         start = file.tell()
@@ -373,9 +353,9 @@ def _joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
-def _order(chunk: _Finished) -> tuple[int, str, int]:
-    """Sort chunks by first log time, then by topic, then as they came."""
-    return chunk.index.message_start_time, chunk.topic, chunk.ordinal
+def _order(chunk: _Finished) -> tuple[int, str]:
+    """Sort chunks by first log time, then by topic; others stay as they came."""
+    return chunk.index.message_start_time, chunk.topic
 
 
 def _summary(groups: list[tuple[Opcode, list[McapRecord]]], start: int) -> bytes:

@@ -1,9 +1,11 @@
 """The store gives back what was written, whatever is present, and the same input gives the same bytes."""
 
 import errno
+import hashlib
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
+from time import sleep
 
 import numpy as np
 import pytest
@@ -28,6 +30,7 @@ from groundstation.base.records import Column, Damage, LogHeader, RecordBatch
 from groundstation.base.signals import TOPICS
 from groundstation.store import channel
 from groundstation.store.channel import CHUNK_SPAN_NS, SHORT_SPAN_NS
+from groundstation.store.framing import message_index
 from groundstation.store.info import StoreInfo
 from groundstation.store.reader import read, read_info
 from groundstation.store.recognition import is_groundstation_mcap
@@ -275,6 +278,26 @@ def test_what_is_kept_in_memory_and_laid_out_at_once_changes_no_byte(
     assert written(tmp_path / "c.mcap", batches).read_bytes() == before
 
 
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_threads_that_compress_change_no_byte_whichever_is_done_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, threads: int
+) -> None:
+    def late(channel_id: int, log_time: NDArray, starts: NDArray) -> bytes:
+        sleep(0.02 if channel_id % 2 else 0.0)
+        return message_index(channel_id, log_time, starts)
+
+    batches = [batch_of(topic, 2_000, step_ns=CHUNK_SPAN_NS // 700) for topic in ("ins", "raw.x", "gnss", "event")]
+    before = written(tmp_path / "a.mcap", batches, StoreInfo(has_utc=True)).read_bytes()
+    monkeypatch.setattr("groundstation.store.writer.COMPRESSING", threads)
+    monkeypatch.setattr("groundstation.store.writer.message_index", late)
+    with StoreWriter(tmp_path / "b.mcap", StoreInfo(has_utc=True)) as writer:
+        for batch in batches:
+            writer.write(batch)
+    found = (tmp_path / "b.mcap").read_bytes()
+    assert found == before
+    assert writer.sha256 == hashlib.sha256(found).hexdigest()
+
+
 OUTSIDE = OutOfRange(record=7, time="+0:01.0", range=(None, 90.0))
 STUCK = StuckStretch(record=3, start="+0:00.2", length_s=4.0, samples=40, value=1.25, why="gnss moves")
 TOPIC = TopicEntry(
@@ -361,7 +384,7 @@ def test_a_disk_that_fills_while_chunks_are_written_is_one_line(
     def full(*_: object) -> bytes:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("groundstation.store.writer.message_index", full)  # in the thread that compresses and writes
+    monkeypatch.setattr("groundstation.store.writer.message_index", full)  # in a thread that compresses
     with (
         pytest.raises(GroundstationError, match="No space left"),
         StoreWriter(tmp_path / "a.mcap", StoreInfo()) as writer,
