@@ -38,9 +38,10 @@ def importing() -> Iterator[None]:
 
 @contextmanager
 def rarely_searched() -> Iterator[None]:
-    """Search for garbage once in 50 000 new objects, in place of 700, and not at the end of the process.
+    """Search for garbage once in 50 000 new objects, and not at the end of the process.
 
-    What is in no circle is freed at once, as ever. For processes of the command line alone, like :func:`importing`.
+    Python's own number is 700. What is in no circle is freed at once, as ever. For processes of the command line alone,
+    like :func:`importing`.
 
     Examples
     --------

@@ -32,7 +32,7 @@ def _entry_points() -> Any:
 
 @cache
 def _may_have_plug_ins() -> bool:
-    """Tell whether an installed package may have an entry point in one of our groups that names code of others.
+    """Tell whether an installed package may name code of others in one of our groups.
 
     True too where packages are found by other means than folders: in a zip, or by a finder of somebody.
     """
@@ -43,7 +43,7 @@ def _may_have_plug_ins() -> bool:
 
 
 def _told_in(folder: str) -> Iterator[str]:
-    """Yield what the packages of a folder say of entry points; a doubt where that cannot be seen."""
+    """Yield what packages of a folder say of entry points; a doubt where unknown."""
     endings = (".dist-info", ".egg-info", *(("egg-info",) if folder.lower().endswith(".egg") else ()))
     try:
         with os.scandir(folder or ".") as inside:
@@ -63,7 +63,7 @@ def _told_in(folder: str) -> Iterator[str]:
 
 
 def _names_others(text: str) -> bool:
-    """Tell whether a file of entry points names code of others in one of our groups.
+    """Tell whether a file of entry points names code of others in our groups.
 
     Examples
     --------

@@ -33,7 +33,10 @@ _TABLES = ("flysight2", OF_PROFILES, "flat-csv", "rtklib-pos")  # names of the r
 
 @cache
 def _readers_of_tables() -> tuple[Reader, ...]:
-    """Readers of tables: half of what reading a binary log would import, so they are loaded for text alone."""
+    """Readers of tables, loaded where a file may be one.
+
+    They would be half of what reading a binary log imports.
+    """
     from groundstation.readers import csv_profile, flat_csv, flysight2, rtklib_pos
 
     return flysight2, csv_profile, flat_csv, rtklib_pos
@@ -240,7 +243,7 @@ def _claims(source: Source) -> tuple[list[Claim], list[GroundstationError], list
 
 
 def _to_ask(claims: list[Claim], source: Source) -> Iterator[tuple[str, Reader]]:
-    """Yield the readers to ask, by name; those of tables while the claims so far leave a doubt."""
+    """Yield the readers to ask, those of tables while the claims leave a doubt."""
     yield from ((reader.NAME, reader) for reader in _BINARY)
     if not _are_sure(claims, source):
         for reader in _readers_of_tables():
