@@ -2,6 +2,7 @@
 
 import io
 import sys
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from groundstation.base.errors import UsageError
-from groundstation.base.garbage import importing
+from groundstation.base.garbage import importing, rarely_searched
 from groundstation.base.version import __version__
 from groundstation.base.without_pandas import spare_pandas
 from groundstation.cli import fleets, flights, plans, profiles, rules, runways, simulated, single_logs, watching
@@ -427,4 +428,5 @@ def main(arguments: Any = None) -> None:
             spare_pandas()  # what Dask imports is Dask's affair
             if sys.argv[1] == "run":
                 import groundstation.pipeline.many_flights.runs.batch  # noqa: F401  # the most of what a run imports
-    application_for(sys.argv[1:] if arguments is None else arguments)(arguments)
+    with rarely_searched() if is_own_process else nullcontext():
+        application_for(sys.argv[1:] if arguments is None else arguments)(arguments)

@@ -12,12 +12,13 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.plug_ins import load_plug_ins
-from groundstation.readers.profile import Profile
-from groundstation.readers.profile_file import SHIPPED, load, shipped
+
+if TYPE_CHECKING:
+    from groundstation.readers.profile import Profile
 
 ENTRY_POINT_GROUP = "groundstation.profiles"
 READER = "csv-profile"  # that of all profiles; its title has the profile's name behind
@@ -28,7 +29,7 @@ MOST_FILES = 1000  # of one folder
 class OtherProfiles:
     """Profiles of others, and a line for each that cannot be used."""
 
-    profiles: tuple[Profile, ...]
+    profiles: "tuple[Profile, ...]"
     failures: tuple[str, ...]
 
 
@@ -65,7 +66,7 @@ def _loaded(folder: Path, _state: tuple[object, ...]) -> OtherProfiles:
     return OtherProfiles(tuple(found.values()), tuple(failures))
 
 
-def known_profiles() -> tuple[Profile, ...]:
+def known_profiles() -> "tuple[Profile, ...]":
     """List the profiles that are tried on every table: those of others before ours."""
     others = other_profiles().profiles
     taken = {profile.name for profile in others}
@@ -73,7 +74,9 @@ def known_profiles() -> tuple[Profile, ...]:
 
 
 @cache
-def _shipped() -> tuple[Profile, ...]:
+def _shipped() -> "tuple[Profile, ...]":
+    from groundstation.readers.profile_file import shipped
+
     return shipped()
 
 
@@ -84,6 +87,8 @@ def known_as(path: Path) -> Path:
     """
     if len(path.parts) != 1 or path.exists():
         return path
+    from groundstation.readers.profile_file import SHIPPED
+
     names = ((one.path, one.name) for one in other_profiles().profiles)
     other = next((found for found, name in names if path.name in (name, found.stem, found.name)), None)
     shipped_path = SHIPPED / f"{path.name.replace('-', '_')}.toml"
@@ -108,8 +113,10 @@ def contents() -> tuple[str, ...]:
     return tuple(digests)
 
 
-def _taken(path: Path, found: dict[str, Profile]) -> str:
+def _taken(path: Path, found: "dict[str, Profile]") -> str:
     """Load a profile into those found; return why it is left out."""
+    from groundstation.readers.profile_file import load
+
     try:
         profile = load(path)
     except GroundstationError as error:

@@ -17,23 +17,9 @@ import numpy as np
 from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
 from groundstation.base.plug_ins import load_plug_ins
 from groundstation.base.records import Item, RecordBatch, Remark
-from groundstation.readers import (
-    bags,
-    chapter10,
-    csv_profile,
-    dataflash,
-    flat_csv,
-    flightdata_hdf5,
-    flysight2,
-    igc,
-    magic,
-    receiver,
-    rtklib_pos,
-    sbet,
-    tlog,
-    ulog,
-)
+from groundstation.readers import bags, chapter10, dataflash, flightdata_hdf5, igc, magic, receiver, sbet, tlog, ulog
 from groundstation.readers.compressed import COMPRESSIONS, compression_of
+from groundstation.readers.profile_sources import READER as OF_PROFILES
 from groundstation.readers.profile_sources import known_profiles, other_profiles
 from groundstation.readers.source import Claim, Reader, Source
 
@@ -41,12 +27,23 @@ if TYPE_CHECKING:
     from groundstation.readers.icd import Icd
 
 ENTRY_POINT_GROUP = "groundstation.readers"
-FLAT_CSV = f"the flat CSV ({flat_csv.PAGE})"
-_OF_TEXT: tuple[Reader, ...] = (flysight2, csv_profile, flat_csv, rtklib_pos)
-_BUILT_IN: tuple[Reader, ...] = (
-    *(chapter10, dataflash, ulog, flightdata_hdf5, receiver, sbet, bags, tlog, igc),
-    *_OF_TEXT,
-)
+_BINARY: tuple[Reader, ...] = (chapter10, dataflash, ulog, flightdata_hdf5, receiver, sbet, bags, tlog, igc)
+_TABLES = ("flysight2", OF_PROFILES, "flat-csv", "rtklib-pos")  # names of the readers of tables
+
+
+@cache
+def _readers_of_tables() -> tuple[Reader, ...]:
+    """Readers of tables, loaded where a file may be one.
+
+    They would be half of what reading a binary log imports.
+    """
+    from groundstation.readers import csv_profile, flat_csv, flysight2, rtklib_pos
+
+    return flysight2, csv_profile, flat_csv, rtklib_pos
+
+
+def _built_in() -> tuple[Reader, ...]:
+    return (*_BINARY, *_readers_of_tables())
 
 
 @dataclass(frozen=True)
@@ -62,7 +59,7 @@ class Format:
 def _plug_ins() -> tuple[dict[str, Reader], tuple[str, ...]]:
     """Third-party readers by name, and one line for each plug-in that cannot be used."""
     readers: dict[str, Reader] = {}
-    taken = {built_in.NAME for built_in in _BUILT_IN}
+    taken = {*(reader.NAME for reader in _BINARY), *_TABLES}
 
     def take(reader: Any) -> str:
         name = str(reader.NAME)
@@ -85,8 +82,9 @@ def _one_line(text: str) -> str:
     return " ".join(text.split())
 
 
-def _readers() -> dict[str, Reader]:
-    return {reader.NAME: reader for reader in _BUILT_IN} | _plug_ins()[0]
+def _reader(name: str) -> Reader:
+    found = next((reader for reader in _BINARY if name == reader.NAME), None) or _plug_ins()[0].get(name)
+    return found or next(reader for reader in _readers_of_tables() if name == reader.NAME)
 
 
 def plug_in_failures() -> tuple[str, ...]:
@@ -96,7 +94,7 @@ def plug_in_failures() -> tuple[str, ...]:
 
 def formats() -> tuple[Format, ...]:
     """Formats that can be read, built-in ones first."""
-    built_in = [Format(reader.NAME, _summary(reader), "built in") for reader in _BUILT_IN]
+    built_in = [Format(reader.NAME, _summary(reader), "built in") for reader in _built_in()]
     added = [Format(name, _summary(reader), "plug-in") for name, reader in _plug_ins()[0].items()]
     return (*built_in, *added)
 
@@ -132,19 +130,27 @@ def read(path: str | Path | Source, profile: Path | None = None, icds: "Sequence
     """
     source = path if isinstance(path, Source) else Source(Path(path))
     claim, troubles = _claim(source, profile)
-    reader = _readers()[claim.reader]
-    if reader in (bags, csv_profile):
-        items = reader.read(source, profile)
+    reader = _reader(claim.reader)
+    if reader is bags:
+        items = bags.read(source, profile)
+    elif claim.reader == OF_PROFILES:
+        items = _by_profile(source, profile)
     elif reader is chapter10:
         items = chapter10.read(source, icds)
     else:
-        items = reader.read(source) if reader in _BUILT_IN else _guarded(reader, claim, source)
+        items = _guarded(reader, claim, source) if claim.reader in _plug_ins()[0] else reader.read(source)
     unused = [Remark("icd_of_another", "the ICD is not used: the log holds no bus words")]
     remarks = [
         *(Remark("plug_in", trouble) for trouble in troubles),
         *(unused if icds and reader is not chapter10 else []),
     ]
     return chain(_in_silence(iter(items)), _of_the_source(source), remarks)
+
+
+def _by_profile(source: Source, profile: Path | None) -> Iterator[Item]:
+    from groundstation.readers import csv_profile
+
+    return csv_profile.read(source, profile)
 
 
 def _in_silence(items: Iterator[Item]) -> Iterator[Item]:
@@ -180,12 +186,19 @@ def _claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]
     if source.is_empty or magic.companion(source) is not None:
         raise _unclaimed(source, [], [])
     if profile is not None:
-        by_profile = bags if bags.sniff(source) else csv_profile
-        return by_profile.claim_by(source, profile), plug_in_failures()
+        return _claim_by(source, profile), plug_in_failures()
     claims, refusals, troubles = _claims(source)
     if claims:
         return _best(claims, source), tuple(troubles)
     raise _unclaimed(source, refusals, troubles)
+
+
+def _claim_by(source: Source, profile: Path) -> Claim:
+    if bags.sniff(source):
+        return bags.claim_by(source, profile)
+    from groundstation.readers import csv_profile
+
+    return csv_profile.claim_by(source, profile)
 
 
 @np.errstate(all="ignore")
@@ -215,15 +228,13 @@ def _claims(source: Source) -> tuple[list[Claim], list[GroundstationError], list
     claims: list[Claim] = []
     refusals: list[GroundstationError] = []
     troubles = list(plug_in_failures())
-    for name, reader in _readers().items():
-        if reader in _OF_TEXT and _are_sure(claims, source):
-            continue
+    for name, reader in _to_ask(claims, source):
         try:
             claim = _own(reader.sniff(source), name)
         except GroundstationError as error:
             refusals.append(error)
         except Exception as error:  # see _plug_ins; a built-in reader must not raise this
-            if reader in _BUILT_IN:
+            if name not in _plug_ins()[0]:
                 raise
             troubles.append(_one_line(f"reader plug-in {name!r} failed to look at the file: {_named(error)}"))
         else:
@@ -231,12 +242,22 @@ def _claims(source: Source) -> tuple[list[Claim], list[GroundstationError], list
     return claims, refusals, troubles
 
 
+def _to_ask(claims: list[Claim], source: Source) -> Iterator[tuple[str, Reader]]:
+    """Yield the readers to ask, those of tables while the claims leave a doubt."""
+    yield from ((reader.NAME, reader) for reader in _BINARY)
+    if not _are_sure(claims, source):
+        for reader in _readers_of_tables():
+            if not _are_sure(claims, source):
+                yield reader.NAME, reader
+    yield from _plug_ins()[0].items()
+
+
 def _are_sure(claims: list[Claim], source: Source) -> bool:
     """Tell whether the claims make a search for rows needless.
 
     They do when a table is claimed, or a format by its first bytes and no text follows.
     """
-    if any(claim.reader == csv_profile.NAME for claim in claims):
+    if any(claim.reader == OF_PROFILES for claim in claims):
         return True
     return any(claim.confidence == 1.0 for claim in claims) and not magic.is_mostly_text(source)
 
@@ -251,9 +272,8 @@ def _best(claims: list[Claim], source: Source) -> Claim:
     """
     if len(claims) == 1:
         return claims[0]
-    tables = {reader.NAME for reader in _OF_TEXT}
-    binary = {reader.NAME for reader in _BUILT_IN} - tables
-    late = binary if magic.is_mostly_text(source) else tables
+    binary = {reader.NAME for reader in _BINARY}
+    late = binary if magic.is_mostly_text(source) else set(_TABLES)
     ranked = sorted(claims, key=lambda claim: (claim.reader in late, -claim.confidence, claim.reader))
     return next((one for one in ranked if one.reader not in binary or _has_records(one, source)), ranked[0])
 
@@ -261,7 +281,7 @@ def _best(claims: list[Claim], source: Source) -> Claim:
 def _has_records(claim: Claim, source: Source) -> bool:
     """Tell whether a built-in reader finds any record."""
     try:
-        return any(isinstance(item, RecordBatch) for item in _readers()[claim.reader].read(source))
+        return any(isinstance(item, RecordBatch) for item in _reader(claim.reader).read(source))
     except GroundstationError:
         return False
 
@@ -282,25 +302,28 @@ def _unclaimed(
     companion = magic.companion(source)
     if companion is not None:
         return UnclaimedLogError(source.name, companion, "", "give the log itself")
+    from groundstation.readers.flat_csv import PAGE
+
+    flat_csv = f"the flat CSV ({PAGE})"
     known = magic.recognise(source)
     if known in COMPRESSIONS and not source.compression:
         return UnclaimedLogError(source.name, f"{known} data that cannot be decompressed")
     if known is not None:
         found = f"recognised as {known}, not readable in this version"
-        return UnclaimedLogError(source.name, found, "", magic.UNPACK.get(known, f"convert it to {FLAT_CSV}"))
+        return UnclaimedLogError(source.name, found, "", magic.UNPACK.get(known, f"convert it to {flat_csv}"))
     if refusals:
         return refusals[0]
     if with_advice and not magic.is_binary(source):
         from groundstation.readers.drafts.nearest import advice_on
 
-        advice = advice_on(source, known_profiles(), flat_csv.PAGE)
+        advice = advice_on(source, known_profiles(), PAGE)
         if advice is not None:
             more = f" ({'; '.join(troubles)})" if troubles else ""
             return UnclaimedLogError(source.name, advice.found + more, "", advice.next_step)
     if magic.is_wide_text(source):
         return UnclaimedLogError(source.name, "UTF-16 text without its mark", "UTF-8", "save it as CSV in UTF-8")
     found = "binary data of an unknown format" if magic.is_binary(source) else "text that no reader claims"
-    names = ", ".join(reader for reader in _readers())
+    names = ", ".join((*(reader.NAME for reader in _built_in()), *_plug_ins()[0]))
     found += f" ({'; '.join(troubles)})" if troubles else ""
-    next_step = f"write {FLAT_CSV}, or describe a table by a profile (--profile FILE)"
+    next_step = f"write {flat_csv}, or describe a table by a profile (--profile FILE)"
     return UnclaimedLogError(source.name, found, f"one of {names}", next_step)
