@@ -8,6 +8,7 @@ from groundstation.base.findings import Finding, Severity
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
+from groundstation.base.words import counted
 from groundstation.integrity.clock import FIRST_NS, ClockModel
 from groundstation.integrity.clock_relation import ClockRelation, Mistake
 from groundstation.integrity.clock_steps import ClockStep
@@ -49,17 +50,6 @@ def clock_findings(ledger: LedgerCounts) -> Iterator[Finding]:
     yield from _absolute(clock)
     for relation in clock.relations:
         yield from _relation(relation, clock, ledger.thresholds.clock_relation.drift_ppm)
-
-
-def counted(count: int, noun: str, nouns: str = "") -> str:
-    """Write a number of things.
-
-    Examples
-    --------
-    >>> counted(1, "loss", "losses"), counted(2, "record")
-    ('1 loss', '2 records')
-    """
-    return f"{count} {noun}" if count == 1 else f"{count} {nouns or noun + 's'}"
 
 
 def _power_ups(several: Sequence[PowerUpClock], clock: ClockModel) -> Finding:

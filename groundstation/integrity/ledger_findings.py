@@ -9,8 +9,9 @@ from groundstation.base.gaps import Gaps, Pause
 from groundstation.base.records import Damage
 from groundstation.base.signals import is_canonical
 from groundstation.base.units import NS_PER_S
+from groundstation.base.words import counted
 from groundstation.integrity.clock import ClockModel
-from groundstation.integrity.clock_findings import clock_findings, counted
+from groundstation.integrity.clock_findings import clock_findings
 from groundstation.integrity.contradictions import CONTRADICTION, Contradiction
 from groundstation.integrity.ledger import FieldCounts, LedgerCounts, TopicCounts
 from groundstation.integrity.limits import DuplicateLimits

@@ -44,7 +44,7 @@ from groundstation.systems.landing.answer import (
 from groundstation.systems.landing.criteria_chapter import criteria_parts
 from groundstation.systems.landing.runway_chapter import along_facts, along_told, runway_facts, with_sigma
 from groundstation.systems.landing.touchdown_chapter import SINK_TIME, touchdown_parts
-from groundstation.systems.landing.verdict_answer import verdict_words
+from groundstation.systems.landing.verdict_answer import verdict_words, worst_verdict
 
 LEAD = "How each approach was flown against its runway, and where it touched down."
 SOURCES = (
@@ -151,8 +151,7 @@ def _course(one: Approach) -> str:
 
 def _verdict(one: Approach) -> Mark:
     """Return the worse of the verdicts from both check heights."""
-    verdicts = [row.verdict for row in one.stabilised]
-    worst = next((word for word in (NOT_STABILISED, "stabilised") if word in verdicts), NOT_MEASURED)
+    worst = worst_verdict(one.stabilised)
     return Mark(TONES[worst], worst)
 
 
