@@ -33,7 +33,7 @@ def clock_findings(ledger: LedgerCounts) -> Iterator[Finding]:
     clock = ledger.clock
     if not clock.has_times:
         if clock.missing_times:
-            text = f"none of the {clock.missing_times} records has a time: nothing can be placed in time"
+            text = f"none of {counted(clock.missing_times, 'record')} has a time: nothing can be placed in time"
             yield Finding("fail", "clock.no_times", text, count=clock.missing_times)
         else:
             yield Finding("fail", "data.none", "the log holds no records")
@@ -110,7 +110,7 @@ def _times(ledger: LedgerCounts) -> Iterator[Finding]:
 
 def _order(clock: ClockModel) -> Iterator[Finding]:
     if clock.is_unordered:
-        text = f"the log is not in order of time ({clock.stray_rows} records after a later one): sorted"
+        text = f"the log is not in order of time ({counted(clock.stray_rows, 'record')} after a later one): sorted"
         yield Finding("warn", "time.unordered", text, count=clock.stray_rows)
     elif clock.stray_rows:
         place = f"record {int(clock.stray_index[0])}"

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.chapters.fleet.common import aircraft_name, bounded, minute, plural, title_of
+from groundstation.chapters.fleet.common import aircraft_name, bounded, minute, title_of
 from groundstation.chapters.fleet.reasons import reasons_of
 from groundstation.chapters.gates import VERDICTS
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Section, Tone, kept
-from groundstation.chapters.wording import ABSENT, clean, clock, number
+from groundstation.chapters.wording import ABSENT, clean, clock, number, plural
 from groundstation.results.fleet import FleetResults
 
 KEY = "flights"

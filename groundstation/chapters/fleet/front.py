@@ -7,10 +7,10 @@ import numpy as np
 
 from groundstation.chapters.fleet import slopes
 from groundstation.chapters.fleet.chapter import FleetChapter
-from groundstation.chapters.fleet.common import aircraft_name, day, figure_of, plural, title_of, verdict_words
+from groundstation.chapters.fleet.common import aircraft_name, day, figure_of, title_of, verdict_words
 from groundstation.chapters.gates import VERDICTS
 from groundstation.chapters.parts import Cell, Front, Mark
-from groundstation.chapters.wording import ABSENT, number
+from groundstation.chapters.wording import ABSENT, number, plural
 from groundstation.results.fleet import FleetResults
 
 MOST_NAMES = 6

@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from groundstation.chapters.fleet.common import plural
 from groundstation.chapters.parts import Grid, Head
-from groundstation.chapters.wording import clean, number, typeset
+from groundstation.chapters.wording import clean, number, plural, typeset
 from groundstation.results.fleet import FleetResults
 
 SHORT = 40  # characters of a reason that stands beside its flight

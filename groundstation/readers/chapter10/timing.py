@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from groundstation.base.records import Int64Array, Remark, UtcReadings
 from groundstation.base.timescales import leap_seconds_at, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
+from groundstation.base.words import counted
 from groundstation.readers.chapter10.tmats import YEARS, Tmats
 from groundstation.readers.rollover import OtherDate, rollovers
 from groundstation.readers.start import zero_of_readings
@@ -231,4 +232,6 @@ def _other(channel: int, readings: Sequence[Reading], year: int, utc_ns: int) ->
     zeros = _every_zero(readings, year)[_last_start(readings) :]
     apart_s = (int(np.sort(zeros)[len(zeros) // 2]) - utc_ns) / NS_PER_S
     code = "clock_disagrees" if abs(apart_s) > _SPREAD_NS / NS_PER_S else "other_time_channel"
-    return Remark(code, f"time channel {channel} ({len(readings)} packets) differs by {apart_s:+.3f} s: it is not used")
+    return Remark(
+        code, f"time channel {channel} ({counted(len(readings), 'packet')}) differs by {apart_s:+.3f} s: it is not used"
+    )

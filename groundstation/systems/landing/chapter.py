@@ -28,6 +28,7 @@ from groundstation.chapters.wording import (
     is_number,
     number,
     percent,
+    plural,
     sentence,
     significant,
     typeset,
@@ -276,7 +277,7 @@ def _protection(one: Approach) -> Facts | None:
     pairs = (
         ("Horizontal, greatest", number(found.horizontal_max_m, 1, "m"), _limit(found.horizontal_alarm_limit_m)),
         ("Vertical, greatest", number(found.vertical_max_m, 1, "m"), _limit(found.vertical_alarm_limit_m)),
-        ("Within the alarm limits", percent(found.within_share), f"of {number(found.epochs, 0)} epochs"),
+        ("Within the alarm limits", percent(found.within_share), f"of {plural(found.epochs, 'epoch')}"),
         ("Meets the alarm limits of", "; ".join(found.operations) or ABSENT, "ICAO Annex 10, table 3.7.2.4-1"),
     )
     return Facts(f"Approach {one.number}: protection levels", pairs)
