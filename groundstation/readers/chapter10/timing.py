@@ -151,7 +151,8 @@ def start_of(readings: Sequence[Reading], dates: Counter[date], tmats: Tmats) ->
     behind = rollovers(moment_ns, others=_of_tmats(tmats) if used[0].year is not None else ())
     shift_ns = behind.shift_ns(moment_ns, is_gps_time=used[-1].is_gps)
     utc_ns = zero.ns + shift_ns
-    text = f"UTC from {len(used)} time packets of channel {chosen}: the counter's zero is {utc_ns_to_iso(utc_ns, 6)}"
+    packets = counted(len(used), "time packet")
+    text = f"UTC from {packets} of channel {chosen}: the counter's zero is {utc_ns_to_iso(utc_ns, 6)}"
     name = f"time channel {chosen}"
     parted = [*zero.remarks(name)] if zero.passed_over else [*_spread(zeros, chosen)]
     others = [
