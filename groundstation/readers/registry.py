@@ -180,6 +180,8 @@ def _claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]
     if source.is_empty or magic.companion(source) is not None:
         raise _unclaimed(source, [], [])
     if profile is not None:
+        if magic.is_archive(source):
+            raise _unclaimed(source, [], [])
         by_profile = bags if bags.sniff(source) else csv_profile
         return by_profile.claim_by(source, profile), plug_in_failures()
     claims, refusals, troubles = _claims(source)
@@ -215,7 +217,10 @@ def _claims(source: Source) -> tuple[list[Claim], list[GroundstationError], list
     claims: list[Claim] = []
     refusals: list[GroundstationError] = []
     troubles = list(plug_in_failures())
+    is_archive = magic.is_archive(source)
     for name, reader in _readers().items():
+        if is_archive and reader in _BUILT_IN:
+            continue
         if reader in _OF_TEXT and _are_sure(claims, source):
             continue
         try:
