@@ -34,7 +34,7 @@ def reasons_of(fleet: FleetResults) -> Reasons:
     flights, groups = fleet.flights, dict[tuple[str, str], list[tuple[str, str]]]()
     kinds = (
         ("rejected", flights["verdict"] == "reject", flights["verdict_reason"]),
-        ("health failed", flights["health_verdict"] == "fail", flights["health_sentence"]),
+        ("health bad", flights["health_verdict"] == "fail", flights["health_sentence"]),
     )
     for word, chosen, texts in kinds:
         for row in np.flatnonzero(chosen):
