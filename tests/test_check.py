@@ -122,6 +122,21 @@ def test_the_table_for_people_names_what_is_wrong(tmp_path: Path) -> None:
     assert "version 1" in text and "ins.true_heading_deg" in text
 
 
+@pytest.mark.parametrize("verb", ["check", "info"])
+def test_equal_remarks_on_several_sensors_are_one_line_that_names_them(verb: str, tmp_path: Path) -> None:
+    log = DataFlash()
+    names = ("BARO", "BAR2", "BAR3")
+    for kind, name in enumerate(names, 130):
+        log.define(kind, name, "Qff", "TimeUS,Alt,Press")
+    for row in range(300):
+        log.write(names[row % 3], 1_000_000 + 20_000 * row, 0.1 * row, 101_325.0 - row)
+    path = tmp_path / "three.bin"
+    path.write_bytes(b"".join(log.records))
+    _code, told, _ = groundstation(verb, path)
+    (line,) = [line for line in told.splitlines() if "from measured pressure" in line]
+    assert line.startswith("info  baro.1, baro.2, baro.3: from measured pressure by the standard atmosphere")
+
+
 def test_exit_codes(tmp_path: Path) -> None:
     good, damaged = SAMPLES / "taxi-good.csv", SAMPLES / "taxi-damaged.csv"
     bad = tmp_path / "bad.bin"

@@ -21,7 +21,7 @@ PACKAGE = Path(groundstation.__file__).parent
 IN_TABLES = {  # words of cells, explained by the tables that they stand in
     *("Observable", "Not observable", "Not known", "No", "Yes", "Within", "Beyond"),
     *("It or another", "GNSS corrects it", "Repeats another", "Repeats "),  # of a unit
-    *("Not assessable", "NOT ACCEPTED", "Planned", "Planned, with warnings", "No usable plan"),
+    *("Not assessable", "Accepted", "NOT ACCEPTED", "Planned", "Planned, with warnings", "No usable plan"),
     *("Pass", "Fail", "Not enough flights", "Not flown", "No limit"),  # of an acceptance, by its own page
 }
 
@@ -67,9 +67,9 @@ def test_every_word_that_grades_an_answer_has_a_meaning() -> None:
 
 
 def test_no_two_words_mean_the_same() -> None:
-    same = {"Not judged", "Not logged"}  # of an answer, and of the autopilot's checks
-    texts = [text for word, text in MEANINGS.items() if word not in same]
-    assert len(texts) == len(set(texts))
+    assert len(set(MEANINGS.values())) == len(MEANINGS)
+    pairs = (("Accept", "Accepted"), ("Good", "Healthy"), ("Bad", "Failed"), ("Not judged", "Not logged"))
+    assert all(word in MEANINGS and other not in MEANINGS for word, other in pairs)
 
 
 def test_the_legend_has_the_words_of_the_page_each_once() -> None:

@@ -33,7 +33,7 @@ FAILED = AutopilotHealth("fail", "Gyros disagree 1:20-1:21", "px4", "in the air"
     [
         (example(ACCEPT, MEASURED), "accept: heading error", "INS"),
         (example(MEASURED, UNDECIDED), "measured: INS", "undecided: heading error"),
-        (example(ACCEPT, FAILED), "failed: autopilot health: Gyros disagree", "accept: heading error"),
+        (example(ACCEPT, FAILED), "bad: autopilot health: Gyros disagree", "accept: heading error"),
     ],
     ids=["decided", "undecided", "danger"],
 )
@@ -53,7 +53,7 @@ def test_a_great_loss_stands_first_on_both_and_once() -> None:
     assert line.startswith("data lost: 21 s of GNSS missing (26 %), in one gap; accept: heading error")
     assert line_of(Outcome("a.csv", "data_lost", line)).count("data lost") == 1
     danger = replace(results, answers=example(ACCEPT, FAILED).answers)
-    assert sentence(danger).startswith("failed: ") and front(danger).key == "health"
+    assert sentence(danger).startswith("bad: ") and front(danger).key == "health"
 
 
 def test_a_page_builds_the_chapters_on_its_answers_once(monkeypatch: pytest.MonkeyPatch) -> None:

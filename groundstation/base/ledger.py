@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from groundstation.base.serial import LEFT_OUT_WHEN_DEFAULT
+from groundstation.base.words import counted
 
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
 
@@ -258,7 +259,11 @@ class Ledger:
     def __repr__(self) -> str:
         rows = sum(one.rows for one in self.topics.values())
         gaps = sum(one.gaps.count for one in self.topics.values())
-        told = [f"{rows} rows of {len(self.topics)} topics", f"{gaps} gaps", f"{len(self.damages)} damages"]
+        told = [
+            f"{counted(rows, 'row')} of {counted(len(self.topics), 'topic')}",
+            counted(gaps, "gap"),
+            counted(len(self.damages), "damage"),
+        ]
         if self.truncated is not None:
             told.append(f"cut at {self.truncated.place}")
         return f"<Ledger: {', '.join(told)}; {'data lost' if self.loses_data else 'no data lost'}>"

@@ -17,15 +17,15 @@ def listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def counted(number: float, noun: str) -> str:
-    """Return a number with its noun, in the plural but for one.
+def counted(number: float, noun: str, nouns: str = "") -> str:
+    """Return a number with its noun, in the plural but for one; ``nouns`` where it is no mere s.
 
     Examples
     --------
-    >>> counted(1, "row"), counted(0, "row"), counted(926, "row")
-    ('1 row', '0 rows', '926 rows')
+    >>> counted(1, "row"), counted(0, "row"), counted(926, "row"), counted(2, "approach", "approaches")
+    ('1 row', '0 rows', '926 rows', '2 approaches')
     """
-    return f"{number:.0f} {noun}{'' if number == 1 else 's'}"
+    return f"{number:.0f} {noun if number == 1 else nouns or f'{noun}s'}"
 
 
 def clock_text(seconds: float) -> str:

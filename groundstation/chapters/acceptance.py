@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from groundstation.chapters.acceptance_front import MARKS, at_least, bound_text, headline, is_worth_less, stated, wanted
 from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Note, Part, Section, Signatures, kept
-from groundstation.chapters.wording import ABSENT, clean, number, sentence
+from groundstation.chapters.wording import ABSENT, clean, number, plural, sentence
 from groundstation.results.acceptance import ENSEMBLE, Acceptance, AcceptanceLimit, InsRow, Judgement
 
 CLAIMS = {
@@ -44,7 +44,7 @@ def _acceptance(found: Acceptance) -> tuple[Section, ...]:
 
 def _irig261(found: Acceptance) -> tuple[Section, ...]:
     left_out = len(found.flights) - len(found.included)
-    functional = f"{number(len(found.included), 0)} flights gave errors of a free INS"
+    functional = f"{plural(len(found.included), 'flight')} gave errors of a free INS"
     if left_out:
         functional += f", {number(left_out, 0)} did not (reasons: table of flights left out)"
     judged = kept((_limits(found), *_notes(found)))
@@ -139,7 +139,7 @@ def _notes(found: Acceptance) -> tuple[Part, ...]:
     for one in found.judgements:
         if one.ins == ENSEMBLE and one.flights and is_worth_less(one):
             told = (
-                f"{clean(found.limit(one.limit).title)}: {number(one.flights, 0)} flights of "
+                f"{clean(found.limit(one.limit).title)}: {plural(one.flights, 'flight')} of "
                 f"{number(one.ins_units, 0)} INS count as {number(one.effective_flights, 1)}: the correlation within "
                 f"an INS is assumed to be {number(one.correlation, 2)}. For these INS alone, every flight counts: at "
                 f"least {at_least(one.share_low_these)} of flights are within."

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.chapters.parts import Cell, Front, Mark
-from groundstation.chapters.wording import ABSENT, clean, number, number_with_unit, percent, significant
+from groundstation.chapters.wording import ABSENT, clean, number, number_with_unit, percent, plural, significant
 from groundstation.results.acceptance import (
     ENSEMBLE,
     QUANTITIES,
@@ -69,7 +69,7 @@ def headline(found: Acceptance) -> str:
 
 
 def _over(one: Judgement) -> str:
-    return f"{number(one.over, 0)} of {number(one.flights, 0)} flights over; " if one.over else ""
+    return f"{number(one.over, 0)} of {plural(one.flights, 'flight')} over; " if one.over else ""
 
 
 def _told(found: Acceptance, one: Judgement) -> str:
@@ -78,10 +78,10 @@ def _told(found: Acceptance, one: Judgement) -> str:
         return f"{clean(limit.title)}: none flown, not judged."
     asked = f"wanted {wanted(limit)} on {stated(limit.share)}"
     if not one.flights:
-        told = f"{clean(limit.title)}: measured on none of {number(one.not_measured, 0)} flights, {asked}."
+        told = f"{clean(limit.title)}: measured on none of {plural(one.not_measured, 'flight')}, {asked}."
         return f"{told} {_missing(found, one)}".strip()
     flown = (
-        f"{number(one.over, 0)} of {number(one.flights, 0)} flights of {number(one.ins_units, 0)} INS over"
+        f"{number(one.over, 0)} of {plural(one.flights, 'flight')} of {number(one.ins_units, 0)} INS over"
         f"{_largest(found, limit)}"
     )
     worth = f" (worth {number(one.effective_flights, 1)} independent flights)" if is_worth_less(one) else ""
@@ -135,7 +135,7 @@ def is_worth_less(one: Judgement) -> bool:
 def _short(found: Acceptance, one: Judgement) -> str:
     """Return how many flights the claim takes, and how many these are short of it."""
     share, sure = stated(found.limit(one.limit).share), stated(found.standard.confidence)
-    needed = f"a claim on {share} of flights at {sure} confidence takes {number(one.flights_needed, 0)} flights"
+    needed = f"a claim on {share} of flights at {sure} confidence takes {plural(one.flights_needed, 'flight')}"
     if not one.flights:
         return f"{needed}, none is there"
     are = "this 1 is" if one.flights == 1 else f"these {number(one.flights, 0)} are"
@@ -186,7 +186,7 @@ def bound_text(limit: AcceptanceLimit, one: Judgement) -> str:
 def _figures(found: Acceptance, whole: InsRow | None) -> tuple[tuple[str, str, str], ...]:
     if whole is None or not whole.flights:
         return ()
-    heading = f"95 % over {number(whole.heading_flights, 0)} flights"
+    heading = f"95 % over {plural(whole.heading_flights, 'flight')}"
     return (
         ("CEP50", number(whole.cep50_rate_nmiph, 2, "nmi/h"), "half of the flights, time-position fit"),
         ("R95", number(whole.r95_rate_nmiph, 2, "nmi/h"), "95 % of the flights, time-position fit"),

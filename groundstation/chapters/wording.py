@@ -13,6 +13,7 @@ from groundstation.base.words import clock_text
 ABSENT = "—"
 MINUS = "−"
 NARROW_SPACE = "\u202f"
+WORD_UNITS = ("dots",)  # units that are words, which have a plural
 MOST_NAMES = 6  # of aircraft, named in a line
 HIDDEN = "\ufffd"  # stands for a control, or a mark that turns the direction of the text around it
 
@@ -47,9 +48,7 @@ def number(value: Any, places: int, unit: str = "", signed: bool = False) -> str
     sign = MINUS if rounded < 0 else "+" if signed and rounded > 0 else ""
     grouped = "," if abs(rounded) >= 10_000 else ""
     text = sign + f"{abs(rounded):{grouped}.{places}f}".replace(",", NARROW_SPACE)
-    if not unit:
-        return text
-    return text + (unit if unit in "°′%" else NARROW_SPACE + unit)
+    return number_with_unit(text, unit)
 
 
 def with_feet(value_m: Any, places: int = 0) -> str:
@@ -211,9 +210,19 @@ def any_value(value: Any, unit: str = "") -> str:
 
 
 def number_with_unit(text: str, unit: str) -> str:
-    """Join a written number and the sign of its unit as is usual for that unit."""
+    """Join a written number and the sign of its unit as is usual for that unit.
+
+    A unit that is a word is in the singular behind one.
+
+    Examples
+    --------
+    >>> number_with_unit("0.05", "°"), number_with_unit("1", "dots"), number_with_unit("2", "dots")
+    ('0.05°', '1\u202fdot', '2\u202fdots')
+    """
     if not unit or text == ABSENT:
         return text
+    if text == "1" and unit in WORD_UNITS:
+        unit = unit.removesuffix("s")
     return text + (unit if unit in "°′%" else NARROW_SPACE + unit)
 
 
@@ -226,3 +235,14 @@ def names_or_count(names: Sequence[str]) -> str:
     ('A, B', '20 aircraft')
     """
     return ", ".join(names) if len(names) <= MOST_NAMES else f"{len(names)} aircraft"
+
+
+def plural(count: int, one: str, many: str = "") -> str:
+    """Return a count with its noun, typeset for a page.
+
+    Examples
+    --------
+    >>> plural(1, "flight"), plural(3, "log"), plural(2, "is", "are")
+    ('1 flight', '3 logs', '2 are')
+    """
+    return f"{number(count, 0)} {one if count == 1 else many or one + 's'}"

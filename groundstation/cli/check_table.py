@@ -13,6 +13,7 @@ from groundstation.cli.lines import tell_errors
 from groundstation.cli.printing import totals
 from groundstation.cli.text import as_json, printable, say, tell
 from groundstation.pipeline.verbs.check import CheckedLog
+from groundstation.results.grouped_findings import named_lines
 
 MOST_LISTED = 8  # gaps or stretches of one topic; all are in the JSON
 
@@ -52,7 +53,7 @@ def text_of(one: CheckedLog, everything: bool = False) -> str:
     parts += [table for table in tables if table]
     findings = [finding for finding in one.findings if everything or not _is_usual(finding)]
     if findings:
-        rows = [[finding.severity, printable(finding.text)] for finding in findings]
+        rows = [[finding.severity, printable(finding.text)] for finding in named_lines(findings)]
         parts.append("findings\n" + columns(rows))
     if len(findings) < len(one.findings):
         usual = "on NaN and repeated times in topics of the source (-v lists them)"

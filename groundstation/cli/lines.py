@@ -13,12 +13,12 @@ MOST_NAMED = 4  # logs of a session
 LONGEST = 160  # characters of a line behind the name of the log
 STATES: Mapping[State, str] = {"data_lost": "data lost", "limit_reached": "at the limit", "incomplete": "incomplete"}
 GRADES: Mapping[str, str] = {
-    **dict.fromkeys(("accept", "accepted", "pass", "good", "agree", "stabilised", "healthy", "consistent"), "green"),
+    **dict.fromkeys(("accept", "pass", "good", "agree", "stabilised", "consistent"), "green"),
     **dict.fromkeys(("measured", "joined"), "green"),
     **dict.fromkeys(("reject", "refused", "fail", "failed", "bad", "wrong", "off", "not", "left GNSS"), "red"),
     **dict.fromkeys(("data lost", "moved while aligning"), "red"),
     **dict.fromkeys(("doubtful", "undecided", "ambiguous", "warn", "warnings", "filter wrong"), "yellow"),
-    **dict.fromkeys(("no rate", "not judged", "not logged", "not measured", "joined roughly"), "yellow"),
+    **dict.fromkeys(("no rate", "not judged", "not measured", "joined roughly"), "yellow"),
     **dict.fromkeys(("advisory", "extend", "too sure", "not stabilised", "they differ", "it or another"), "yellow"),
 }
 _BESIDE = re.compile(r" \([^()]*\)")

@@ -9,6 +9,7 @@ from groundstation.base.text_columns import columns
 from groundstation.cli.lines import Lines
 from groundstation.cli.text import as_json, printable, say, tell
 from groundstation.pipeline.one_flight.outcome import Outcome, State, worst_code
+from groundstation.results.grouped_findings import named_lines
 
 if TYPE_CHECKING:
     from groundstation.pipeline.verbs.describe import BusWord, Description
@@ -41,7 +42,7 @@ def description(what: "Description", *, everything: bool = False) -> str:
     if what.buses:
         parts.append(_every_word(what.buses) if everything else _every_bus(what.buses))
     if what.findings:
-        rows = [[finding.severity, printable(finding.text)] for finding in what.findings]
+        rows = [[finding.severity, printable(finding.text)] for finding in named_lines(what.findings)]
         parts.append("findings\n" + columns(rows))
     return "\n\n".join(parts)
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from groundstation.base.words import counted
 from groundstation.cli.application import (
     DONE,
     FAILED,
@@ -108,8 +109,8 @@ def rules_text(found: "RulesTest", *, everything: bool = False) -> str:
         if everything or (row.verdict_before != row.verdict_after and _is_why(row))
     ]
     totals = (
-        f"{found.rules}: {found.flights} flights, {found.judged} verdicts, {found.changed} change, "
-        f"{found.no_longer_accepted} no longer accepted"
+        f"{found.rules}: {counted(found.flights, 'flight')}, {counted(found.judged, 'verdict')}, "
+        f"{found.changed} change, {found.no_longer_accepted} no longer accepted"
     )
     reasons = sorted({row.needs_log for row in found.rows if row.needs_log})
     needs = [

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from groundstation.base.words import counted
 from groundstation.cli.application import (
     DONE,
     Json,
@@ -123,7 +124,7 @@ def table_text(table: "TableInUse") -> str:
         (
             f"{table.version}, {table.licence}",
             f"file: {table.file}",
-            f"runways: {table.runways} of {table.rows} rows; left out:",
+            f"runways: {table.runways} of {counted(table.rows, 'row')}; left out:",
             *left_out,
         )
     )

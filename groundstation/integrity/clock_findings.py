@@ -8,6 +8,7 @@ from groundstation.base.findings import Finding, Severity
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
+from groundstation.base.words import counted
 from groundstation.integrity.clock import FIRST_NS, ClockModel
 from groundstation.integrity.clock_relation import ClockRelation, Mistake
 from groundstation.integrity.clock_steps import ClockStep
@@ -32,7 +33,7 @@ def clock_findings(ledger: LedgerCounts) -> Iterator[Finding]:
     clock = ledger.clock
     if not clock.has_times:
         if clock.missing_times:
-            text = f"none of the {clock.missing_times} records has a time: nothing can be placed in time"
+            text = f"none of {counted(clock.missing_times, 'record')} has a time: nothing can be placed in time"
             yield Finding("fail", "clock.no_times", text, count=clock.missing_times)
         else:
             yield Finding("fail", "data.none", "the log holds no records")
@@ -49,17 +50,6 @@ def clock_findings(ledger: LedgerCounts) -> Iterator[Finding]:
     yield from _absolute(clock)
     for relation in clock.relations:
         yield from _relation(relation, clock, ledger.thresholds.clock_relation.drift_ppm)
-
-
-def counted(count: int, noun: str, nouns: str = "") -> str:
-    """Write a number of things.
-
-    Examples
-    --------
-    >>> counted(1, "loss", "losses"), counted(2, "record")
-    ('1 loss', '2 records')
-    """
-    return f"{count} {noun}" if count == 1 else f"{count} {nouns or noun + 's'}"
 
 
 def _power_ups(several: Sequence[PowerUpClock], clock: ClockModel) -> Finding:
@@ -120,7 +110,7 @@ def _times(ledger: LedgerCounts) -> Iterator[Finding]:
 
 def _order(clock: ClockModel) -> Iterator[Finding]:
     if clock.is_unordered:
-        text = f"the log is not in order of time ({clock.stray_rows} records after a later one): sorted"
+        text = f"the log is not in order of time ({counted(clock.stray_rows, 'record')} after a later one): sorted"
         yield Finding("warn", "time.unordered", text, count=clock.stray_rows)
     elif clock.stray_rows:
         place = f"record {int(clock.stray_index[0])}"

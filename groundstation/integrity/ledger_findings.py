@@ -9,8 +9,9 @@ from groundstation.base.gaps import Gaps, Pause
 from groundstation.base.records import Damage
 from groundstation.base.signals import is_canonical
 from groundstation.base.units import NS_PER_S
+from groundstation.base.words import counted
 from groundstation.integrity.clock import ClockModel
-from groundstation.integrity.clock_findings import clock_findings, counted
+from groundstation.integrity.clock_findings import clock_findings
 from groundstation.integrity.contradictions import CONTRADICTION, Contradiction
 from groundstation.integrity.ledger import FieldCounts, LedgerCounts, TopicCounts
 from groundstation.integrity.limits import DuplicateLimits
@@ -108,7 +109,7 @@ def _duplicates(topic: TopicCounts, clock: ClockModel, limits: DuplicateLimits) 
     It is none for the topics of a counting clock, whose sources share times.
     """
     share = topic.duplicates / topic.rows
-    text = f"{topic.topic}: {topic.duplicates} of {topic.rows} records repeat the time of the one before"
+    text = f"{topic.topic}: {topic.duplicates} of {counted(topic.rows, 'record')} repeat the time of the one before"
     is_many = topic.duplicates >= limits.fewest and share > limits.share
     is_odd = is_many and is_canonical(topic.topic) and not clock.is_counting
     if is_odd and share > limits.standing_share:
@@ -151,14 +152,14 @@ def _field(topic: str, field: FieldCounts, clock: ClockModel) -> Iterator[Findin
         text = f"{name}: {counted(field.at_end, 'sample')} of {field.present} at the end of the range"
         yield Finding("warn", "values.saturated", text, topic, count=field.at_end)
     if field.nan:
-        text = f"{name}: {field.nan} of {field.present} values are NaN as the device wrote them"
+        text = f"{name}: NaN, as the device wrote it, in {field.nan} of {counted(field.present, 'value')}"
         yield Finding("info", "values.nan", text, topic, count=field.nan)
     if field.stuck:
         longest = max(field.stuck, key=lambda one: one.length_s)
         place = clock.text(longest.start_ns)
         text = (
             f"{name}: stuck {counted(len(field.stuck), 'time')}, the longest at {longest.value:g} for "
-            f"{longest.length_s:.1f} s ({longest.samples} samples) from {place}: {longest.why}"
+            f"{longest.length_s:.1f} s ({counted(longest.samples, 'sample')}) from {place}: {longest.why}"
         )
         yield Finding("warn", "values.stuck", text, topic, place, len(field.stuck))
 

@@ -7,6 +7,8 @@ from groundstation.readers.source import Source
 _SAMPLES, _SAMPLE_BYTES = 32, 4096
 _CONTROL = re.compile(rb"[\0-\x08\x0b\x0c\x0e-\x1f]")
 
+_TAR_AT, _TAR = 257, b"ustar"
+ZIP = "zip (or a spreadsheet)"
 _AT_START: tuple[tuple[bytes, str], ...] = (
     (b"ULog\x01\x12\x35", "PX4 ULog"),
     (b"\xa3\x95", "ArduPilot DataFlash without its definitions"),
@@ -15,7 +17,9 @@ _AT_START: tuple[tuple[bytes, str], ...] = (
     (b"#ROSBAG", "ROS 1 bag older than version 2.0"),
     (b"SQLite format 3\0", "SQLite that is no ROS 2 bag"),
     (b"\x1f\x8b", "gzip"),
-    (b"PK\x03\x04", "zip (or a spreadsheet)"),
+    *((b"PK" + kind, ZIP) for kind in (b"\x03\x04", b"\x05\x06", b"\x07\x08")),
+    (b"7z\xbc\xaf\x27\x1c", "7z"),
+    (b"Rar!\x1a\x07", "RAR"),
     (b"\x28\xb5\x2f\xfd", "zstd"),
     (b"BZh", "bzip2"),
     (b"\xfd7zXZ\0", "xz"),
@@ -25,8 +29,12 @@ _AT_START: tuple[tuple[bytes, str], ...] = (
 )
 
 
+HOLD_FILES = (ZIP, "tar", "7z", "RAR")  # archives in which a log may stand uncompressed, between their own bytes
 UNPACK = {  # archives that are not opened -> next step
-    "zip (or a spreadsheet)": "unpack it and give the log inside, or save the spreadsheet as CSV",
+    ZIP: "unpack it and give the log inside, or save the spreadsheet as CSV",
+    "tar": "unpack it (tar -xf) and give the logs inside",
+    "7z": "unpack it and give the log inside",
+    "RAR": "unpack it and give the log inside",
     "bzip2": "unpack it (bunzip2) and give the log; gzip and zstd are read as they are",
     "xz": "unpack it (unxz) and give the log; gzip and zstd are read as they are",
 }
@@ -34,7 +42,14 @@ UNPACK = {  # archives that are not opened -> next step
 
 def recognise(source: Source) -> str | None:
     """Return the format that a file's first bytes show, None when they show none."""
+    if source.head.startswith(_TAR, _TAR_AT):
+        return "tar"
     return next((name for magic, name in _AT_START if source.head.startswith(magic)), None)
+
+
+def is_archive(source: Source) -> bool:
+    """Tell whether a file is an archive of files: a log that is stored in it is not the file itself."""
+    return recognise(source) in HOLD_FILES
 
 
 def companion(source: Source) -> str | None:

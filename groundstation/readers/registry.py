@@ -186,6 +186,8 @@ def _claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]
     if source.is_empty or magic.companion(source) is not None:
         raise _unclaimed(source, [], [])
     if profile is not None:
+        if magic.is_archive(source):
+            raise _unclaimed(source, [], [])
         return _claim_by(source, profile), plug_in_failures()
     claims, refusals, troubles = _claims(source)
     if claims:
@@ -244,8 +246,10 @@ def _claims(source: Source) -> tuple[list[Claim], list[GroundstationError], list
 
 def _to_ask(claims: list[Claim], source: Source) -> Iterator[tuple[str, Reader]]:
     """Yield the readers to ask, those of tables while the claims leave a doubt."""
-    yield from ((reader.NAME, reader) for reader in _BINARY)
-    if not _are_sure(claims, source):
+    is_archive = magic.is_archive(source)  # others may unpack it
+    if not is_archive:
+        yield from ((reader.NAME, reader) for reader in _BINARY)
+    if not is_archive and not _are_sure(claims, source):
         for reader in _readers_of_tables():
             if not _are_sure(claims, source):
                 yield reader.NAME, reader

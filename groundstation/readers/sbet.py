@@ -23,6 +23,7 @@ from groundstation.base.geodesy import NO_POSITION, curvature_radii_m
 from groundstation.base.records import MAX_BATCH_ROWS, Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.timescales import GPS_EPOCH_NS, gps_week_to_utc_ns, iso_to_utc_ns
 from groundstation.base.units import ARCMIN_PER_DEG, DEG_PER_RAD, MPS2_PER_G, NS_PER_S
+from groundstation.base.words import counted
 from groundstation.readers.receiver.times import calendar_ns
 from groundstation.readers.sbet_records import (
     ACCURACY,
@@ -357,4 +358,6 @@ def _remarks(week: int | None, sense: _Sense, accuracies: NDArray[Any]) -> Itera
         text = "accelerations are without gravity, no specific force: they stay raw"
         yield Remark("mapped", text, "ins")
     if len(accuracies):
-        yield Remark("mapped", f"accuracies from the smrmsg file beside it ({len(accuracies)} records)", "ins")
+        yield Remark(
+            "mapped", f"accuracies from the smrmsg file beside it ({counted(len(accuracies), 'record')})", "ins"
+        )

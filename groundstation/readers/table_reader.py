@@ -23,6 +23,7 @@ from groundstation.base.records import (
     Remark,
 )
 from groundstation.base.signals import kind_of
+from groundstation.base.words import counted
 from groundstation.readers import cells
 from groundstation.readers.conversions import read_cells, sided
 from groundstation.readers.days import DayCount
@@ -273,7 +274,7 @@ class TableReader:
             text = f"{derivation.topic}: {outputs} derived from {METHODS[derivation.method].text}"
             yield Remark("derived", text, derivation.topic, derivation.outputs)
         for target, count in self._wrapped.items():
-            text = f"{target}: {count} values outside [0, 360) brought into it by whole turns"
+            text = f"{target}: {counted(count, 'value')} outside [0, 360) brought into it by whole turns"
             yield Remark("wrapped_heading", text, target.rpartition(".")[0])
         if self.zoneless:
             yield Remark("assumed_utc", f"{self.zoneless} times without a zone are read as UTC")

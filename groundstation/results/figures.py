@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.records import frozen
 from groundstation.base.unit_names import units_of
+from groundstation.base.words import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,7 +43,7 @@ class FigureData:
         return min((len(values) for values in self.columns.values()), default=0)
 
     def __repr__(self) -> str:
-        return f"<FigureData {self.name}: {len(self)} rows of {', '.join(self.columns)}>"
+        return f"<FigureData {self.name}: {counted(len(self), 'row')} of {', '.join(self.columns)}>"
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.columns[name]

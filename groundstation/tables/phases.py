@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.base.units import NS_PER_S
+from groundstation.base.words import counted
 from groundstation.tables.detector import Detection, GroundSettings, detect_ground, lasting
 from groundstation.tables.likely import likely_of
 from groundstation.tables.motion import (
@@ -278,7 +279,7 @@ class _Evidence:
             return "no weight on wheels"
         proves, denies = held(self.contact, self.grid_ns)
         if np.count_nonzero(proves | denies) < LEAST_COVERAGE * len(self.grid_ns):
-            return f"{self.contact.name} logged too rarely, {len(self.contact.time_ns)} samples"
+            return f"{self.contact.name} logged too rarely, {counted(len(self.contact.time_ns), 'sample')}"
         return disbelief(self.contact, self.motion, self.grid_ns)
 
     @property

@@ -16,6 +16,7 @@ from groundstation.base.signals import RAW_PREFIX, TOPICS, field_of, is_canonica
 from groundstation.base.source_units import source_units
 from groundstation.base.unit_names import split_unit
 from groundstation.base.units import NS_PER_S
+from groundstation.base.words import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,7 +79,7 @@ class Table:
         return self.text(name) if self.columns[name].values.dtype.kind == "U" else self.values(name)
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} {self.topic}: {len(self)} rows of {', '.join(self.columns)}>"
+        return f"<{type(self).__name__} {self.topic}: {counted(len(self), 'row')} of {', '.join(self.columns)}>"
 
     def _absent(self, name: str) -> None:
         """Refuse a name that no signal has; a field that this log merely lacks is absent."""

@@ -11,9 +11,10 @@ import numpy as np
 
 from groundstation.base.failures import attempt
 from groundstation.chapters.fleet import flights, rest
-from groundstation.chapters.fleet.common import aircraft_name, plural
+from groundstation.chapters.fleet.common import aircraft_name
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.parts import Grid, Note, Section, shortened
+from groundstation.chapters.wording import plural
 from groundstation.results.fleet import FleetResults
 from groundstation.systems.system import Systems
 from groundstation.viewer.fleet_recorder import FleetRecorder

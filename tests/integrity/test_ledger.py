@@ -59,7 +59,7 @@ def test_values_outside_the_range_and_nan_are_counted() -> None:
     assert fields["pdop"].out_of_range == 1
     texts = {finding.code: finding.text for finding in ledger_findings(found) if "latitude" in finding.text}
     assert "2 values outside [-90, 90], first at record 8" in texts["values.out_of_range"]
-    assert "1 of 4 values are NaN" in texts["values.nan"]
+    assert "NaN, as the device wrote it, in 1 of 4 values" in texts["values.nan"]
 
 
 @pytest.mark.parametrize(

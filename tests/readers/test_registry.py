@@ -1,5 +1,7 @@
 """Formats are found by content; what cannot be read is refused in one clear line; plug-ins cannot break a run."""
 
+import tarfile
+import zipfile
 from collections.abc import Iterator
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -11,6 +13,7 @@ from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Item, LogHeader, Remark
 from groundstation.readers import registry
 from groundstation.readers.source import Claim, Source
+from tests.readers.ulog_writer import small_flight
 from tests.real_logs import real_log
 
 MAGICS = [
@@ -44,6 +47,33 @@ def test_an_archive_that_is_not_opened_is_to_be_unpacked(tmp_path: Path, content
     (tmp_path / "log.ulg").write_bytes(content + bytes(20))
     text = refusal(tmp_path / "log.ulg")
     assert "unpack it" in text and "flat CSV" not in text
+
+
+@pytest.mark.parametrize("compression", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED], ids=["stored", "deflated"])
+@pytest.mark.parametrize("kind", ["ulog", "csv"])
+def test_a_log_in_a_zip_is_refused_however_it_is_packed(tmp_path: Path, kind: str, compression: int) -> None:
+    """A stored log begins behind the zip's own bytes: no reader takes these for damage of the log."""
+    with zipfile.ZipFile(tmp_path / "logs.zip", "w", compression) as packed:
+        packed.writestr("log", plain_log(kind))
+    text = refusal(tmp_path / "logs.zip")
+    assert "recognised as zip" in text and "unpack it and give the log inside" in text
+    assert registry.unclaimed(tmp_path / "logs.zip") is not None
+
+
+@pytest.mark.parametrize("kind", ["ulog", "csv"])
+def test_a_tar_is_refused_like_a_zip(tmp_path: Path, kind: str) -> None:
+    (tmp_path / "log").write_bytes(plain_log(kind))
+    for name, mode in (("logs.tar", "w"), ("logs.tar.gz", "w:gz")):
+        with tarfile.open(tmp_path / name, mode) as packed:  # type: ignore[call-overload]
+            packed.add(tmp_path / "log", "log")
+        assert "recognised as tar" in refusal(tmp_path / name)
+
+
+def plain_log(kind: str) -> bytes:
+    """A short log that its reader claims."""
+    if kind == "csv":
+        return b"time_s,ins.roll_deg\n" + b"".join(b"%d,1.0\n" % row for row in range(200))
+    return bytes(small_flight().data)
 
 
 @pytest.mark.parametrize(

@@ -264,12 +264,12 @@ def test_what_asks_for_a_look_is_on_the_first_screen(tmp_path: Path) -> None:
     ids = fleet.flights["flight_id"].tolist()
     first = as_read(page).split("Every flight of the fleet")[0]
     assert f"Rejected: {ids[0]}." in first and f"Approach not stabilised: {ids[0]}." in first
-    assert f"Data lost: {ids[1]}." in first and f"Health failed: {ids[2]}." in first
-    assert "1 rejected · 1 approach not stabilised · 1 flight with failed health · 1 flight with lost data" in first
+    assert f"Data lost: {ids[1]}." in first and f"Health bad: {ids[2]}." in first
+    assert "1 rejected · 1 approach not stabilised · 1 flight with bad health · 1 flight with lost data" in first
     heads = [one.title for one in flights.heads_of(fleet)]
     assert heads[-5:] == ["Duration", "Approaches", "Health", "Trajectory", "Remarks"]
     rows = cells((tmp_path / PAGE).read_text(encoding="utf-8"))
-    assert rows[0][10:14] == ["1:02:05", "▲ 2 (1)", "—", "✓ accepted"] and "a.ulg" in rows[0][15]
+    assert rows[0][10:14] == ["1:02:05", "▲ 2 (1)", "—", "✓ accept"] and "a.ulg" in rows[0][15]
     assert "1 approach not stabilised (last: speed, sink rate)" in rows[0][14] and "vibration high" in rows[2][14]
     bare = fleet_of(3, ("A12",), samples=20, error_deg=[math.nan] * 3)
     assert "Error, °" not in [one.title for one in flights.heads_of(bare)]

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from groundstation.pipeline.verbs.acceptance import accept
@@ -52,6 +53,27 @@ PICTURES = """[...document.querySelectorAll(".plot > svg")].map((svg) => {
     const box = svg.getBoundingClientRect();
     return [box.width, box.height, svg.querySelectorAll("path, text").length];
 })"""
+# What is written into each canvas, and where.
+NOTE_TEXTS = """(() => {
+    const write = CanvasRenderingContext2D.prototype.fillText;
+    window.written = new Map();
+    CanvasRenderingContext2D.prototype.fillText = function (text, x, y, ...rest) {
+        if (!written.has(this.canvas)) written.set(this.canvas, []);
+        const { e, f } = this.getTransform();
+        written.get(this.canvas).push([text, Math.round(x + e), Math.round(y + f)]);
+        return write.call(this, text, x, y, ...rest);
+    };
+})()"""
+# The axes of numbers: each the places of its ticks in pixels, with what they say.
+AXES = """[...written.values()].flatMap((texts) => [1, 2].flatMap((along) => {
+    const axes = new Map();
+    for (const one of texts) {
+        const value = Number(one[0].replace("\u2212", "-"));
+        if (!Number.isFinite(value)) continue;
+        axes.set(one[3 - along], (axes.get(one[3 - along]) ?? new Map()).set(one[along], value));
+    }
+    return [...axes.values()].filter((axis) => axis.size > 3).map((axis) => [...axis].sort((a, b) => a[0] - b[0]));
+}))"""
 TOO_WIDE = "document.documentElement.scrollWidth - innerWidth"
 
 
@@ -132,3 +154,19 @@ def test_a_page_shows_all_of_its_figures(kind: str, chromium: Browser, page_of: 
     chromium.run(SEE_ALL)
     assert chromium.run(TOO_WIDE) <= 0, "wider than a phone"
     assert chromium.complaints() == []
+
+
+@pytest.mark.parametrize("width", [500, 700, 900, 1100, 1200])
+def test_ticks_of_live_figures_are_round(width: int, chromium: Browser, page_of: Callable[[str], Path]) -> None:
+    """Ticks at steps of 2.5 read 33, 30, 28, 25 without decimals: no value of theirs lies where it says."""
+    noting = chromium.ask("Page.addScriptToEvaluateOnNewDocument", source=NOTE_TEXTS)
+    try:
+        chromium.open(page_of("landing"), width=width, height=12000)
+        assert chromium.run(SEE_ALL) == 0
+        axes: Any = chromium.run(AXES)
+    finally:
+        chromium.ask("Page.removeScriptToEvaluateOnNewDocument", identifier=noting["identifier"])
+    assert axes
+    for axis in axes:
+        steps = np.diff([value for _place, value in axis])
+        assert np.ptp(steps) < 1e-9 * abs(steps[0]) and f"{abs(steps[0]):e}"[0] in "125", axis

@@ -20,6 +20,7 @@ from groundstation.base.errors import GroundstationError, lack_of_memory
 from groundstation.base.geodesy import north_east_m
 from groundstation.base.runways.table import LONGEST_M, RunwayTable
 from groundstation.base.units import M_PER_FOOT
+from groundstation.base.words import counted
 
 SOURCE, LICENCE = "OurAirports", "Unlicense (public domain); unofficial"
 MOST_BYTES = 64_000_000  # of the text; the file of 2026 has 4 MB
@@ -68,7 +69,7 @@ def read_ourairports(path: Path, dated: str) -> RunwayTable:
         else:
             kept.append(found)
     if not kept:
-        raise GroundstationError(str(path), f"no runway in {rows} rows", EXPECTED, NEXT_STEP)
+        raise GroundstationError(str(path), f"no runway in {counted(rows, 'row')}", EXPECTED, NEXT_STEP)
     kept.sort(key=lambda one: (one[3][0], one[0], one[1]))
     airport, names, surface, latitude, longitude, elevation, displaced, length, width, closed = zip(*kept, strict=True)
     return RunwayTable(

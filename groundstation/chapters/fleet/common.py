@@ -76,14 +76,3 @@ def day(time: np.datetime64) -> str:
 def minute(time: np.datetime64) -> str:
     """Return a time to the minute: 2026-05-04 06:00; an em dash where it is missing."""
     return ABSENT if np.isnat(time) else str(time.astype("datetime64[m]")).replace("T", " ")
-
-
-def plural(count: int, one: str, many: str = "") -> str:
-    """Return a count with its noun.
-
-    Examples
-    --------
-    >>> plural(1, "flight"), plural(3, "log"), plural(2, "is", "are")
-    ('1 flight', '3 logs', '2 are')
-    """
-    return f"{number(count, 0)} {one if count == 1 else many or one + 's'}"

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.chapters.fleet.common import aircraft_name, bounded, minute, plural, title_of
+from groundstation.chapters.fleet.common import aircraft_name, bounded, minute, title_of
 from groundstation.chapters.fleet.reasons import reasons_of
 from groundstation.chapters.gates import VERDICTS
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Section, Tone, kept
-from groundstation.chapters.wording import ABSENT, clean, clock, number
+from groundstation.chapters.wording import ABSENT, clean, clock, number, plural
 from groundstation.results.fleet import FleetResults
 
 KEY = "flights"
@@ -122,16 +122,27 @@ def _approaches(row: dict[str, Any]) -> Cell:
     return Mark("warn", f"{count} ({number(unstable, 0)})") if unstable >= 1.0 else count
 
 
-def _graded(name: str, tones: Mapping[str, Tone]) -> Callable[[dict[str, Any]], Cell]:
+def _graded(name: str, marks: Mapping[str, Mark]) -> Callable[[dict[str, Any]], Cell]:
+    """Make a cell of a grade, in the words of the pages of flights."""
+
     def cell(row: dict[str, Any]) -> Cell:
         text = clean(row[name])
-        return Mark(tones.get(text, "unknown"), text) if text else ABSENT
+        return marks.get(text, Mark("unknown", text)) if text else ABSENT
 
     return cell
 
 
-GRADES: Mapping[str, Tone] = {"pass": "good", "warn": "warn", "fail": "bad"}
-STATES: Mapping[str, Tone] = {"accepted": "good", "doubtful": "warn", "ambiguous": "warn"}
+GRADES: Mapping[str, Mark] = {
+    "pass": Mark("good", "good"),
+    "warn": Mark("warn", "warnings"),
+    "fail": Mark("bad", "bad"),
+    "not_logged": Mark("unknown", "not judged"),
+}
+STATES: Mapping[str, Mark] = {
+    "accepted": Mark("good", "accept"),
+    "doubtful": Mark("warn", "doubtful"),
+    "ambiguous": Mark("warn", "ambiguous"),
+}
 COLUMNS = (
     Column(Head("Flight"), lambda row: row["flight_id"]),
     Column(Head("Aircraft"), lambda row: aircraft_name(row["aircraft"])),

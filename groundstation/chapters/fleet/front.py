@@ -7,10 +7,10 @@ import numpy as np
 
 from groundstation.chapters.fleet import slopes
 from groundstation.chapters.fleet.chapter import FleetChapter
-from groundstation.chapters.fleet.common import aircraft_name, day, figure_of, plural, title_of, verdict_words
+from groundstation.chapters.fleet.common import aircraft_name, day, figure_of, title_of, verdict_words
 from groundstation.chapters.gates import VERDICTS
 from groundstation.chapters.parts import Cell, Front, Mark
-from groundstation.chapters.wording import ABSENT, number
+from groundstation.chapters.wording import ABSENT, number, plural
 from groundstation.results.fleet import FleetResults
 
 MOST_NAMES = 6
@@ -86,7 +86,7 @@ def _attention(fleet: FleetResults) -> tuple[Mark, str]:
         (off, "flight with an INS off", "flights with an INS off"),
         (rejected, "rejected", "rejected"),
         (unstable, "approach not stabilised", "approaches not stabilised"),
-        (unhealthy, "flight with failed health", "flights with failed health"),
+        (unhealthy, "flight with bad health", "flights with bad health"),
         (lost, "flight with lost data", "flights with lost data"),
         *((outliers, "outlier", "outliers"), (failed, "log failed", "logs failed")),
     )
@@ -106,7 +106,7 @@ def _flights(fleet: FleetResults) -> list[str]:
     kinds = (
         ("Rejected", flights["verdict"] == "reject"),
         ("Approach not stabilised", flights["landing_unstable_approaches"] > 0),
-        ("Health failed", flights["health_verdict"] == "fail"),
+        ("Health bad", flights["health_verdict"] == "fail"),
         ("Data lost", flights["has_lost_data"].astype(np.bool_)),
     )
     return [f"{title}: {_some(flights['flight_id'][chosen].tolist())}." for title, chosen in kinds if chosen.any()]

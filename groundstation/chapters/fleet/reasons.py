@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from groundstation.chapters.fleet.common import plural
 from groundstation.chapters.parts import Grid, Head
-from groundstation.chapters.wording import clean, number, typeset
+from groundstation.chapters.wording import clean, number, plural, typeset
 from groundstation.results.fleet import FleetResults
 
 SHORT = 40  # characters of a reason that stands beside its flight
@@ -35,7 +34,7 @@ def reasons_of(fleet: FleetResults) -> Reasons:
     flights, groups = fleet.flights, dict[tuple[str, str], list[tuple[str, str]]]()
     kinds = (
         ("rejected", flights["verdict"] == "reject", flights["verdict_reason"]),
-        ("health failed", flights["health_verdict"] == "fail", flights["health_sentence"]),
+        ("health bad", flights["health_verdict"] == "fail", flights["health_sentence"]),
     )
     for word, chosen, texts in kinds:
         for row in np.flatnonzero(chosen):

@@ -4,7 +4,7 @@ import numpy as np
 
 from groundstation.chapters.fleet.common import QUANTITIES, aircraft_name, bounded, day, figure_of, title_of
 from groundstation.chapters.parts import Cell, Grid, Head, Mark
-from groundstation.chapters.wording import ABSENT, number
+from groundstation.chapters.wording import ABSENT, number, plural
 from groundstation.results.fleet import FleetResults
 from groundstation.results.fleet_trends import SlopeRow
 
@@ -26,7 +26,7 @@ def sentence_of(one: SlopeRow, fleet: FleetResults) -> str:
     slope, low, high = (_slope(one, value) for value in one.per_flight)
     told = (
         f"{aircraft_name(one.aircraft)}: {title_of(one.quantity)} {_verb(one)} by {slope} a flight (95 % {low} … "
-        f"{high}) over {number(one.flights, 0)} flights since {_since(one, fleet)}, now "
+        f"{high}) over {plural(one.flights, 'flight')} since {_since(one, fleet)}, now "
         f"{figure_of(one.quantity, one.level)}"
     )
     due = _due(one)

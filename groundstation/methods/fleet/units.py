@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base import words
 from groundstation.methods.fleet.slopes import FEWEST
 from groundstation.methods.fleet.unit_series import (
     SeriesSettings,
@@ -330,7 +331,7 @@ def _outlook(
     line, since = found.line, len(counted) - found.since
     if line is None:
         missing = max(FEWEST - since, 1)
-        flights = "1 flight" if since == 1 else f"{since} flights"
+        flights = words.counted(since, "flight")
         word = "since its last change " if found.since else ""
         text = f"{flights} {word}with a rate: {missing} more needed, no date"
         return _Outlook("few", text, missing=missing)
@@ -401,7 +402,8 @@ def _moves(serial: str, own: Sequence[FlownUnit], limits: UnitLimits) -> Iterato
                 yield UnitEventRow("two_aircraft", *place, told)
         days = (other.start_utc_ns - one.start_utc_ns) / NS_PER_DAY
         if days > limits.gap_days:
-            told = f"no flight from {_day(one.start_utc_ns)} to {_day(other.start_utc_ns)} ({days:.0f} days)"
+            length = words.counted(round(days), "day")
+            told = f"no flight from {_day(one.start_utc_ns)} to {_day(other.start_utc_ns)} ({length})"
             yield UnitEventRow("gap", *place, told)
     for one in own:
         if one.why_undated == CLOCK:

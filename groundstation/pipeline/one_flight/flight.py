@@ -15,6 +15,7 @@ from groundstation.base.failures import attempt, failures, gathered_failures, is
 from groundstation.base.findings import SEVERITIES, Finding, worst
 from groundstation.base.records import RecordBatch
 from groundstation.base.to_disk import sync_folder
+from groundstation.base.words import counted
 from groundstation.pipeline.one_flight.analyse import Given, analyse
 from groundstation.pipeline.one_flight.apply import apply_step, corrected_name, write_derived
 from groundstation.pipeline.one_flight.convert import Converted, convert_flight, parts_told
@@ -227,7 +228,9 @@ def _parts(log: Log, job: Job, path: str, converted: Converted, flight: Flight) 
         return (whole,)
     missing = sum(part.rows for part in job.parts) - whole.rows
     if missing > MOST_APART * (len(job.parts) - 1):
-        raise GroundstationError(log.source.name, f"{missing} records of its parts are missing", "files of one layout")
+        raise GroundstationError(
+            log.source.name, f"{counted(missing, 'record')} of its parts missing", "files of one layout"
+        )
     return tuple(replace(one, sha256=sha256) for one, sha256 in zip(job.parts, log.digests, strict=True))
 
 

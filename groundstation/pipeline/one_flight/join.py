@@ -18,6 +18,7 @@ from groundstation.base.ledger import DamagedSpan, Ledger
 from groundstation.base.records import HEADING_IS_TRACK, Damage, Int64Array, RecordBatch
 from groundstation.base.source_units import PREFIX as UNITS
 from groundstation.base.units import NS_PER_S
+from groundstation.base.words import counted
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.ledger import damage_entry
 from groundstation.integrity.limits import Thresholds, shipped
@@ -183,7 +184,7 @@ def _require_different(logs: Sequence[Log], left_out: int) -> None:
     count = sum(max(1, len(log.parts)) for log in logs) + left_out
     if not 2 <= count <= len(LABELS) + 1:
         raise UsageError(
-            "--together", f"{count} log" + "s" * (count != 1), f"2 to {len(LABELS) + 1} logs"
+            "--together", counted(count, "log"), f"2 to {len(LABELS) + 1} logs"
         )  # files of one recording count each
     first: dict[str, str] = {}
     for log in logs:

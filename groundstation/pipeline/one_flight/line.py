@@ -37,8 +37,8 @@ def verdict_first(verdict: str, text: str) -> str:
     --------
     >>> verdict_first("Accept", "accept: heading error +0.9 deg"), verdict_first("Good", "RTK fixed 99 %")
     ('accept: heading error +0.9 deg', 'good: RTK fixed 99 %')
-    >>> verdict_first("Failed", "autopilot health failed: gyros disagree")
-    'failed: autopilot health: gyros disagree'
+    >>> verdict_first("Bad", "autopilot health bad: gyros disagree")
+    'bad: autopilot health: gyros disagree'
     >>> verdict_first("Reject", "magnetic deviation reject (no turn)")
     'reject: magnetic deviation (no turn)'
     >>> verdict_first("Off", "ins.1 is off: velocity error 3.2 m/s")

@@ -20,6 +20,7 @@ from groundstation.base.records import HEADING_IS_TRACK, MAX_BATCH_ROWS, Damage,
 from groundstation.base.signals import TOPICS, kind_of, topics_of_kind
 from groundstation.base.timescales import GPS_EPOCH_NS, gps_week_to_utc_ns, leap_seconds_at, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
+from groundstation.base.words import counted
 from groundstation.pipeline.one_flight.configuration import References
 from groundstation.pipeline.one_flight.log import Log, open_log
 
@@ -184,7 +185,8 @@ def _span_text(path: Path, named: str) -> str:
 
 def _findings(reference: Reference, table: "Table") -> list[Finding]:
     name = reference.name
-    text = f"{name} ({reference.reader}, {reference.table.topic}) judges this flight: {len(table)} samples as truth"
+    samples = counted(len(table), "sample")
+    text = f"{name} ({reference.reader}, {reference.table.topic}) judges this flight: {samples} as truth"
     found = [Finding("info", "reference.laid", text, TRUTH)]
     if reference.is_weekly:
         text = f"{name} has seconds of a GPS week but no date: the week of the log is used"

@@ -14,6 +14,7 @@ from groundstation.base.ledger import DamagedSpan, Ledger
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.base.timescales import iso_to_utc_ns, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
+from groundstation.base.words import counted
 from groundstation.integrity.limits import Thresholds
 from groundstation.pipeline.many_flights.inputs import file_in
 from groundstation.pipeline.one_flight.analyse import analyse
@@ -383,7 +384,9 @@ def _told(info: "StoreInfo") -> str:
     ends = [info.metadata.get(key) for key in ("clip.from_s", "clip.to_s")]
     start, end = (f"{float(text):.3f} s" if text else word for text, word in zip(ends, ("start", "end"), strict=True))
     origin = info.metadata.get(CUT_FROM, "a flight made anonymous")
-    return f"{rows} records of {len(topics)} topics, {start} to {end} of {origin}, {_length(info)}"
+    return (
+        f"{counted(rows, 'record')} of {counted(len(topics), 'topic')}, {start} to {end} of {origin}, {_length(info)}"
+    )
 
 
 def _length(info: "StoreInfo") -> str:

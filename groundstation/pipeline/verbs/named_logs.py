@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from groundstation.base.errors import UsageError
+from groundstation.base.words import counted
 from groundstation.pipeline.many_flights.inputs import collect, is_ours, is_session, no_log
 from groundstation.pipeline.one_flight.log import as_log, is_claimed
 
@@ -56,7 +57,7 @@ def logs_named(paths: Sequence[Path], profile: Path | None = None) -> NamedLogs:
         found = [one.path for one in collect([path])]
         claimed = [one for one in found if is_claimed(one, profile)]
         if not claimed:
-            raise UsageError(str(path), f"no log among {len(found)} files", "a log, or a folder with logs")
+            raise UsageError(str(path), f"no log among {counted(len(found), 'file')}", "a log, or a folder with logs")
         others += len(found) - len(claimed)
         logs += claimed
     alone = folders[0] if len(paths) == len(folders) == 1 else None

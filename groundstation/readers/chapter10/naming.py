@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.records import BoolArray, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.signals import kind_of, topics_of_kind
+from groundstation.base.words import counted
 from groundstation.readers import imu
 from groundstation.readers.chapter10.bus_words import ANY_ERROR, TOPIC_429, TOPIC_1553, bounded, words_of
 from groundstation.readers.chapter10.contents import KEYS, BusNames, channel_of, keys_429, keys_1553
@@ -350,7 +351,9 @@ class Namer:
         for topic, (errors, total) in sorted(self._flagged.items()):
             if errors:
                 yield Remark(
-                    "bus_errors", f"{topic}: {errors} of {total} messages have an error: kept, not used", topic
+                    "bus_errors",
+                    f"{topic}: {errors} of {counted(total, 'message')} with an error: kept, not used",
+                    topic,
                 )
         for topic, count in sorted(self._nowhere.items()):
             yield nowhere(topic, count)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from groundstation.base.records import Damage, Int64Array, Remark
+from groundstation.base.words import counted
 from groundstation.readers.chapter10 import kinds, scan
 from groundstation.readers.chapter10.tmats import Tmats
 from groundstation.readers.skipped import bytes_place
@@ -95,7 +96,7 @@ class RecordingTally:
         listed = ", ".join(f"{count} {kinds.name_of(kind)}" for kind, count in sorted(types.items()))
         wrong = sum(one.verdict == scan.WRONG_CHECKSUM for one in self.wrong)
         text = (
-            f"{self.packets} packets: {listed}; data checksums of {self.checked}, {wrong} wrong; "
+            f"{counted(self.packets, 'packet')}: {listed}; data checksums of {self.checked}, {wrong} wrong; "
             f"{self.secondary} secondary headers; {self.filler_bytes} bytes of filler"
         )
         if self.unsynced:
@@ -109,7 +110,7 @@ class RecordingTally:
         for (channel, kind), count in sorted(self.by_channel.items()):
             said = tmats.channels[channel].kind if channel in tmats.channels else ""
             if kind not in kinds.OF_CHANNEL.get(said, (kind,)):
-                held = f"{count} {kinds.name_of(kind)} packets"
+                held = counted(count, f"{kinds.name_of(kind)} packet")
                 text = f"channel {channel} is {said} by TMATS and has {held}: they are believed"
                 yield Remark("tmats_contradicted", text)
 

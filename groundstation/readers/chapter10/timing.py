@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from groundstation.base.records import Int64Array, Remark, UtcReadings
 from groundstation.base.timescales import leap_seconds_at, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
+from groundstation.base.words import counted
 from groundstation.readers.chapter10.tmats import YEARS, Tmats
 from groundstation.readers.rollover import OtherDate, rollovers
 from groundstation.readers.start import zero_of_readings
@@ -150,7 +151,8 @@ def start_of(readings: Sequence[Reading], dates: Counter[date], tmats: Tmats) ->
     behind = rollovers(moment_ns, others=_of_tmats(tmats) if used[0].year is not None else ())
     shift_ns = behind.shift_ns(moment_ns, is_gps_time=used[-1].is_gps)
     utc_ns = zero.ns + shift_ns
-    text = f"UTC from {len(used)} time packets of channel {chosen}: the counter's zero is {utc_ns_to_iso(utc_ns, 6)}"
+    packets = counted(len(used), "time packet")
+    text = f"UTC from {packets} of channel {chosen}: the counter's zero is {utc_ns_to_iso(utc_ns, 6)}"
     name = f"time channel {chosen}"
     parted = [*zero.remarks(name)] if zero.passed_over else [*_spread(zeros, chosen)]
     others = [
@@ -231,4 +233,6 @@ def _other(channel: int, readings: Sequence[Reading], year: int, utc_ns: int) ->
     zeros = _every_zero(readings, year)[_last_start(readings) :]
     apart_s = (int(np.sort(zeros)[len(zeros) // 2]) - utc_ns) / NS_PER_S
     code = "clock_disagrees" if abs(apart_s) > _SPREAD_NS / NS_PER_S else "other_time_channel"
-    return Remark(code, f"time channel {channel} ({len(readings)} packets) differs by {apart_s:+.3f} s: it is not used")
+    return Remark(
+        code, f"time channel {channel} ({counted(len(readings), 'packet')}) differs by {apart_s:+.3f} s: it is not used"
+    )

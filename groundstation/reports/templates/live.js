@@ -231,7 +231,9 @@
     const shownOnes = found.filter((value) => value >= low * (1 - 1e-9) && value <= high * (1 + 1e-9));
     return shownOnes.length > 1 ? shownOnes : [low, high];
   };
-  const splitsOf = (isLog) => (isLog ? { splits: (_, __, low, high) => decades(low, high), filter: (_, splits) => splits } : {});
+  // Steps of ticks whose decimals are those of their decade: beside steps of 2.5 rounded numbers would repeat.
+  const ROUND_STEPS = Array.from({ length: 60 }, (_, at) => [1, 2, 5].map((part) => Number(`${part}e${at - 30}`))).flat();
+  const splitsOf = (isLog) => (isLog ? { splits: (_, __, low, high) => decades(low, high), filter: (_, splits) => splits } : { incrs: ROUND_STEPS });
   const numbers = (splits, isLog) => {
     // Beside ticks: with the decimals of the step between them.
     const known = splits.filter((value) => value != null), decimals = known.length > 1 && !isLog ? decimalsOf(known[1] - known[0]) : null;

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from itertools import pairwise
 
-from groundstation.base.words import never_a_fix
+from groundstation.base.words import counted, never_a_fix
 from groundstation.systems.gnss.answer import (
     NO_FIXES,
     STATE_NAMES,
@@ -36,7 +36,7 @@ def sentence_of(one: GnssReceiver) -> str:
         return never_had(one)
     told = [_first_fix(one) + listed((_states(one), _lost(one)))]
     if one.satellites_used is not None:
-        told.append(f"{one.satellites_used:.0f} satellites")
+        told.append(counted(round(one.satellites_used), "satellite"))
     stood = one.told_standstill
     if stood is not None and (scatter := scatter_of(stood, len(one.fixes) > 1)):
         told.append(scatter)

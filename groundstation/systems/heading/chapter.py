@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from groundstation.chapters.agreement import agreement_note
 from groundstation.chapters.gates import NOT_ASSESSABLE, gate_grid, setting_facts
 from groundstation.chapters.parts import Facts, Figure, Grid, Head, Note, Part, Section, kept
-from groundstation.chapters.wording import ABSENT, clock, interval, is_number, number, step_places, typeset
+from groundstation.chapters.wording import ABSENT, clock, interval, is_number, number, plural, step_places, typeset
 from groundstation.results.chosen import ChosenInterval
 from groundstation.results.flight import FlightResults
 from groundstation.systems.heading.advice_chapter import explained
@@ -104,9 +104,9 @@ def _second(answer: HeadingResult) -> Note | None:
         else f" (correlation of their differences {number(second.correlation, 2, signed=True)})"
     )
     text = (
-        f"Heading error by taxi {taxi}; {second.by} on the same straights {other}, {second.samples} epochs. {meet}. "
-        f"Both rest on the INS heading and on GNSS velocity{at_once}, so they are not combined; agreement is weaker "
-        "evidence than that of independent numbers."
+        f"Heading error by taxi {taxi}; {second.by} on the same straights {other}, {plural(second.samples, 'epoch')}. "
+        f"{meet}. Both rest on the INS heading and on GNSS velocity{at_once}, so they are not combined; agreement is "
+        "weaker evidence than that of independent numbers."
     )
     return Note(typeset(text), "good" if second.agrees else "warn")
 
@@ -219,7 +219,7 @@ def _standstill_facts(answer: HeadingResult) -> Facts | None:
     sigma = f"{number(still.sigma_north_mps, 4, 'm/s')} / {number(still.sigma_east_mps, 4, 'm/s')}"
     length, bound = number(still.speed_of_mean_mps, 4, "m/s"), number(still.speed_bound97_mps, 4, "m/s")
     share = number(still.share_above_limit * 100.0, 1, "%")
-    span, samples = f"{clock(still.start_s)} – {clock(still.end_s)}", f"{number(still.samples, 0)} samples"
+    span, samples = f"{clock(still.start_s)} – {clock(still.end_s)}", plural(still.samples, "sample")
     pairs = (
         ("Interval", span, samples),
         ("Proof of standstill", still.ground_proof or ABSENT, ""),

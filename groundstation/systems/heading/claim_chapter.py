@@ -5,7 +5,16 @@ from collections.abc import Mapping
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.chapters.gates import VERDICTS, failed_to_inform
 from groundstation.chapters.parts import Claim, Rank
-from groundstation.chapters.wording import ABSENT, interval, is_number, number, step_places, typeset, with_full_stop
+from groundstation.chapters.wording import (
+    ABSENT,
+    interval,
+    is_number,
+    number,
+    plural,
+    step_places,
+    typeset,
+    with_full_stop,
+)
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.gates_answer import LEAVES_OPEN
 from groundstation.systems.heading.reason_answer import why_alone
@@ -127,12 +136,12 @@ def _in_words(heading: HeadingResult) -> str:
 
 def figures(heading: HeadingResult) -> tuple[tuple[str, str, str], ...]:
     """Return the figures that decide, each with what it rests on."""
-    samples, taxi = number(heading.samples, 0), number(heading.taxi_seconds, 0, "s")
+    samples, taxi = plural(heading.samples, "sample"), number(heading.taxi_seconds, 0, "s")
     shown, sigma = number(heading.parking_ins_heading_deg, 2, "°"), number(heading.parking_sigma_deg, 2, "°")
     remark = f"95 % interval {interval(heading.confidence95_deg, 3, '°')}"
     found = (
         ("Heading error", number(heading.error_deg, 3, "°", signed=True), remark),
-        ("Precision e", number(heading.precision_deg, 3, "°"), f"{samples} samples, {taxi} of straight taxi"),
+        ("Precision e", number(heading.precision_deg, 3, "°"), f"{samples}, {taxi} of straight taxi"),
         ("Parking heading, corrected", number(heading.parking_heading_deg, 2, "°"), f"INS showed {shown}; σ {sigma}"),
         _against_reference(heading),
     )

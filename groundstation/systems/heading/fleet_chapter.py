@@ -4,11 +4,10 @@ from groundstation.chapters.fleet.chapter import KeyFigure
 from groundstation.chapters.fleet.common import (
     aircraft_name,
     bounded,
-    plural,
     span_of,
 )
 from groundstation.chapters.parts import Figure, Grid, Head, Note, Section
-from groundstation.chapters.wording import number, percent
+from groundstation.chapters.wording import number, percent, plural
 from groundstation.results.fleet import AircraftRow, FleetResults
 
 LEAD = (

@@ -6,10 +6,10 @@ Overlaid with the fitted normal (figure 3 of the paper).
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.chapters.fleet.common import aircraft_name, plural
+from groundstation.chapters.fleet.common import aircraft_name
 from groundstation.chapters.plots.common import label
 from groundstation.chapters.plots.fleet.common import left_out, roles_of, rows_shown
-from groundstation.chapters.wording import number
+from groundstation.chapters.wording import number, plural
 from groundstation.plots.marks import SERIES, AnyMark, Band, Curve, Emphasis, Floats, Role, series
 from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import padded
@@ -53,7 +53,7 @@ def _of_all(fleet: FleetResults, low: float, high: float) -> tuple[list[AnyMark]
     if normal is not None:
         mean_and_sigma = f"mean {angle(normal.mean_deg)} and σ {number(normal.sigma_deg, 3, '°')}"
         fitted = f"; black: the normal fitted to them with {mean_and_sigma}"
-    told = f"{_how_drawn(len(densities), roles)} Dashed: all {number(int(densities.samples.sum()), 0)} samples{fitted}."
+    told = f"{_how_drawn(len(densities), roles)} Dashed: all {plural(int(densities.samples.sum()), 'sample')}{fitted}."
     return marks, top, told
 
 

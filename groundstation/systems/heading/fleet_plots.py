@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from groundstation.chapters.fleet.common import plural
 from groundstation.chapters.plots.common import label
 from groundstation.chapters.plots.fleet.common import ROW_MM, left_out, name_axis, rows_shown
+from groundstation.chapters.wording import plural
 from groundstation.plots.marks import AnyMark, Dots, Intervals, Limit
 from groundstation.plots.plot import Axis, Panel, Plot, one_panel
 from groundstation.plots.ranges import finite

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.errors import NotAssessableError
+from groundstation.base.words import counted
 from groundstation.methods.taxi.delay import KnownDelay, known_delay
 from groundstation.methods.taxi.gating import gate_samples
 from groundstation.methods.taxi.samples import HEADING_AND_VELOCITY, HeadingOf, OnGround, TaxiSamples, pair_samples
@@ -141,4 +142,4 @@ def _why_nothing_is_used(samples: TaxiSamples, settings: HeadingSettings) -> str
     fast = samples.gate[samples.speed_mps > limit]
     names, counts = np.unique(fast, return_counts=True)
     shares = ", ".join(f"{name} {count}" for name, count in zip(names, counts, strict=True))
-    return f"no straight taxi: of {len(fast)} epochs above {limit:g} m/s before lift-off: {shares}"
+    return f"no straight taxi: of {counted(len(fast), 'epoch')} above {limit:g} m/s before lift-off: {shares}"

@@ -7,6 +7,7 @@ import numpy as np
 
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import ARCMIN_PER_DEG
+from groundstation.base.words import counted
 from groundstation.methods.taxi.gating import NOT_TAXI, is_straight_and_fast
 from groundstation.methods.taxi.samples import VELOCITY_SIGMA, TaxiSamples
 from groundstation.results.gates import Bound, Gate, judged_gate
@@ -203,7 +204,7 @@ def _taxi_gates(samples: TaxiSamples, settings: HeadingSettings, judge: _Judge) 
         judge(
             "not_taxi",
             float(run.sum()) / max(int(run.sum()) + used, 1),
-            f"{run.sum()} epochs" if run.any() else "",
+            counted(run.sum(), "epoch") if run.any() else "",
         ),
         judge(
             "before_take_off",

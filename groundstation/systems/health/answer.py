@@ -12,7 +12,7 @@ from groundstation.results.frames import Brief
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
 
 Verdict = Literal["pass", "warn", "fail", "not_logged"]
-HEADLINES: Mapping[Verdict, str] = {"pass": "Healthy", "warn": "Warnings", "fail": "Failed", "not_logged": "Not logged"}
+HEADLINES: Mapping[Verdict, str] = {"pass": "Good", "warn": "Warnings", "fail": "Bad", "not_logged": "Not judged"}
 FALL = "log ends in the air"  # how the text of a fall begins
 LOST = "attitude_lost_deg"  # quantity of the tracking check
 IN_TENTHS_S = 10.0  # a shorter span is told in tenths of a second

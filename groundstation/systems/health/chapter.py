@@ -8,7 +8,17 @@ from collections.abc import Mapping, Sequence
 from groundstation.base.words import tenths_text
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Cell, Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, Tone
-from groundstation.chapters.wording import ABSENT, clean, clock, number, percent, significant, typeset, with_full_stop
+from groundstation.chapters.wording import (
+    ABSENT,
+    clean,
+    clock,
+    number,
+    percent,
+    plural,
+    significant,
+    typeset,
+    with_full_stop,
+)
 from groundstation.results.flight import FlightResults
 from groundstation.systems.health.answer import (
     FIRST,
@@ -66,7 +76,7 @@ def _claim(answer: AutopilotHealth) -> Claim:
     logged = sum(one.verdict != "not_logged" for one in answer.checks)
     first, rest = told_apart(answer.checks, answer.loss)
     sentences = [with_full_stop(typeset(one)) for one in rest]
-    sentences.append(f"{number(passed, 0)} of {number(logged, 0)} checks pass {answer.judged_over}.")
+    sentences.append(f"{number(passed, 0)} of {plural(logged, 'check')} pass {answer.judged_over}.")
     is_danger = answer.verdict == "fail" and answer.is_flown
     return Claim(Rank.HEALTH, mark, typeset(first), "", "", sentences, figures, is_danger=is_danger)
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray
+from groundstation.base.words import counted
 from groundstation.methods.ins_noise import InsNoise
 from groundstation.methods.intervals import BOUND95
 from groundstation.methods.kalman import filter as kalman
@@ -63,7 +64,9 @@ def _azimuth(start_s: float | None, azimuth: AzimuthEstimate | None) -> tuple[Me
         return None, "too few turns in the first hour of turns to carry it back"
     error_deg, sigma_deg = azimuth.early.at(start_s)
     back_min = (azimuth.early.time_s - start_s) / 60.0
-    return Measured(error_deg, BOUND95 * sigma_deg), f"{azimuth.early.turns} turns, carried back {back_min:.0f} min"
+    return Measured(
+        error_deg, BOUND95 * sigma_deg
+    ), f"{counted(azimuth.early.turns, 'turn')}, carried back {back_min:.0f} min"
 
 
 def _tilts(

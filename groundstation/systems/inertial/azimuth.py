@@ -11,6 +11,7 @@ import numpy as np
 from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.base.quantiles import student_quantile
 from groundstation.base.records import BoolArray
+from groundstation.base.words import counted
 from groundstation.methods.ins_noise import RADPS_PER_DPH
 from groundstation.methods.intervals import BOUND95
 from groundstation.results.roles import AzimuthEstimate, EarlyAzimuth
@@ -116,8 +117,8 @@ def estimate_azimuth(
         return _refused(
             len(changes),
             largest,
-            f"{len(changes)} turns or other changes of velocity of {limits.change_mps:g} m/s or more with GNSS on both "
-            f"sides; at least {limits.least_changes} are needed",
+            f"{counted(len(changes), 'turn or other change', 'turns or other changes')} of velocity of "
+            f"{limits.change_mps:g} m/s or more with GNSS on both sides; at least {limits.least_changes} are needed",
         )
     if changes.point_one_way(limits):
         return _refused(len(changes), largest, "all changes of velocity point the same way")

@@ -61,6 +61,18 @@ class CauseShare:
     share: Within95  #: Share of the mean square velocity error; all add up to 1, one may be negative.
 
 
+def taken_away(share: float) -> str:
+    """Return what the other causes do to a share above the whole error; empty of a share within it.
+
+    Examples
+    --------
+    >>> taken_away(1.034), taken_away(1.004), taken_away(0.6)
+    ('the other causes take 3 % away', '', '')
+    """
+    percent = round(100.0 * share) - 100
+    return f"the other causes take {percent} % away" if percent > 0 else ""
+
+
 @dataclass(frozen=True)
 class CauseParameter:
     """Constant of the INS that the coupled model estimates over the whole flight.

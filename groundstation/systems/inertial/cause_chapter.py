@@ -12,6 +12,7 @@ from groundstation.systems.inertial.cause_answer import (
     SchulerWave,
     StraightLeg,
     Within95,
+    taken_away,
 )
 from groundstation.systems.inertial.claim_chapter import lead_of
 from groundstation.systems.inertial.units_answer import Measured
@@ -58,7 +59,7 @@ def causes(results: FlightResults) -> Section | None:
         Figure("causes.along"),
         _windows(answer),
     )
-    headline = f"{CAUSES[_top(answer).name][0]}: {number(100.0 * _top(answer).share.value, 0, '%')}"
+    headline = f"{CAUSES[_top(answer).name][0]}: {number(100.0 * _top(answer).share.value, 0, '%')}{_away(answer)}"
     return Section(
         "ins_causes",
         TITLE,
@@ -79,7 +80,14 @@ def _claim(answer: CausesResult, headline: str) -> Claim:
     share = _top(answer).share
     mark = Mark("good", "Measured") if share.low95 > HALF else Mark("unknown", "Undecided")
     value = number(100.0 * share.value, 0, "%")
-    return Claim(Rank.FORECAST, mark, headline, value, WORDS[_top(answer).name], (f"{typeset(answer.sentence)}.",))
+    remark = f"{WORDS[_top(answer).name]}{_away(answer)}"
+    return Claim(Rank.FORECAST, mark, headline, value, remark, (f"{typeset(answer.sentence)}.",))
+
+
+def _away(answer: CausesResult) -> str:
+    """Return behind a comma what cancels of a largest share above 100 %."""
+    away = taken_away(_top(answer).share.value)
+    return f", {typeset(away)}" if away else ""
 
 
 def _one_heading(answer: CausesResult) -> Note | None:
@@ -108,9 +116,9 @@ def _half(one: Measured | None, places: int) -> str:
 def _shares(answer: CausesResult) -> Grid:
     heads = (Head("Cause"), Head("Share, %", True), Head("95 %", True), Head("From"))
     caption = (
-        "Of the mean square velocity error, both channels; all add up to 100 %. Below zero or above 100: two causes "
-        "cancel. A bias that acts like a tilt counts as tilt, an azimuth or gyro error that acts like a constant "
-        "drift as drift."
+        "Of the mean square velocity error, both channels; all add up to 100 % but for rounding. Below zero or above "
+        "100: causes cancel. A bias that acts like a tilt counts as tilt, an azimuth or gyro error that acts like a "
+        "constant drift as drift."
     )
     rows = [_share_row(one) for one in answer.shares if one.name != "reset" or answer.resets]
     return Grid("What explains the error", heads, rows, caption, ("causes_over_time",))

@@ -19,6 +19,7 @@ from groundstation.systems.inertial.cause_answer import (
     ParameterName,
     SchulerWave,
     Within95,
+    taken_away,
 )
 from groundstation.systems.inertial.cause_arrays import CausesAlong, CausesOverTime, PartsOfChannel
 from groundstation.systems.inertial.cause_fit import (
@@ -332,7 +333,9 @@ def _sentence(
 ) -> str:
     top = max(shares, key=lambda one: one.share.value)
     share = top.share
-    of_it = f"{100 * share.value:.0f} % ({100 * share.low95:.0f} to {100 * share.high95:.0f} %)"
+    away = taken_away(share.value)
+    within = f"{100 * share.low95:.0f} to {100 * share.high95:.0f} %"
+    of_it = f"{100 * share.value:.0f} % ({within}{f'; {away}' if away else ''})"
     what = OF_CAUSE.get(top.name, "")
     if top.name == "schuler":
         mrad = 1000.0 * tilt.value / ARCSEC_PER_RAD

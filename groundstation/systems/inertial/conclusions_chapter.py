@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from groundstation.base.words import listed
 from groundstation.chapters.parts import Note
-from groundstation.chapters.wording import clock, is_number, number, percent, typeset
+from groundstation.chapters.wording import clock, is_number, number, percent, plural, typeset
 from groundstation.results.forecast_methods import FORECAST_METHODS
 from groundstation.systems.inertial.forecast_answer import FEWEST_STARTS, ForecastResult, SkillRow
 
@@ -44,7 +44,7 @@ def _gain(answer: ForecastResult) -> Note | None:
     text = (
         f"After {horizon:g} min without GNSS 95 % of the errors are below {number(ours.p95_m, 0, 'm')} by the shipped "
         f"method ({title_of(default)}) and below {number(theirs.p95_m, 0, 'm')} by the raw INS (RMS "
-        f"{number(ours.rms_m, 0, 'm')} and {number(theirs.rms_m, 0, 'm')}), over {number(ours.starts, 0)} starts; it "
+        f"{number(ours.rms_m, 0, 'm')} and {number(theirs.rms_m, 0, 'm')}), over {plural(ours.starts, 'start')}; it "
         f"beats the raw INS {_where(better, shared)}.{_early(answer, 60.0 * horizon)}"
     )
     return Note(text, "good" if len(better) == len(shared) else "warn")

@@ -11,6 +11,7 @@ from groundstation.base.findings import Finding
 from groundstation.base.geodesy import curvature_radii_m, on_earth
 from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.base.units import NS_PER_S
+from groundstation.base.words import counted
 from groundstation.systems.inertial import screening
 from groundstation.systems.inertial.filter import DifferenceEpochs
 from groundstation.systems.inertial.model import FloatArray
@@ -258,7 +259,7 @@ def _binned(
     ins_s, gnss_s = flight.seconds(ins.time_ns), flight.seconds(gnss.time_ns)
     last = max([*ins_s[-1:], *gnss_s[-1:], 0.0])
     if last > LONGEST_FLIGHT_S:
-        raise NotAssessableError("inertial", f"a log of {last / 86400.0:.0f} days", "a flight")
+        raise NotAssessableError("inertial", f"a log of {counted(round(last / 86400.0), 'day')}", "a flight")
     # half an interval of offset: samples on whole intervals, with jitter either way, fall into one bin each
     bins = [np.floor(part / interval + 0.5).astype(np.int64) for part in (ins_s, gnss_s)]
     which = np.unique(np.concatenate(bins))

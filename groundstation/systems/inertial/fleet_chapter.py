@@ -3,9 +3,9 @@
 import numpy as np
 
 from groundstation.chapters.fleet.chapter import KeyFigure
-from groundstation.chapters.fleet.common import aircraft_name, bounded, plural
+from groundstation.chapters.fleet.common import aircraft_name, bounded
 from groundstation.chapters.parts import Cell, Figure, Grid, Head, Note, Part, Section
-from groundstation.chapters.wording import clean, is_number, number, percent
+from groundstation.chapters.wording import clean, is_number, number, percent, plural
 from groundstation.results.fleet import WHOLE_FLEET, FleetResults, FleetSkill
 from groundstation.results.forecast_methods import FORECAST_HORIZONS_MIN, FORECAST_METHODS
 
@@ -91,7 +91,7 @@ def figures(fleet: FleetResults) -> tuple[KeyFigure, ...]:
     if row is None:
         return ()
     title, each = f"Forecast, {row.horizon_min:g} min", by_aircraft(fleet, row)
-    remark = f"RMS over {number(row.starts, 0)} starts on {plural(row.flights, 'flight')}"
+    remark = f"RMS over {plural(row.starts, 'start')} on {plural(row.flights, 'flight')}"
     if len(each) < 2:
         return ((title, bounded(row.rms_m, 0, "m"), remark),)
     low, high = bounded(min(each.values()), 0), bounded(max(each.values()), 0, "m")

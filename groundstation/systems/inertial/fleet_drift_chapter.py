@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.chapters.fleet.chapter import KeyFigure
-from groundstation.chapters.fleet.common import aircraft_name, bounded, plural
+from groundstation.chapters.fleet.common import aircraft_name, bounded
 from groundstation.chapters.parts import Figure, Grid, Head, Note, Section
-from groundstation.chapters.wording import number
+from groundstation.chapters.wording import number, plural
 from groundstation.results.fleet import FleetResults
 
 RATE = "radial_error_rate_fit_nmiph"

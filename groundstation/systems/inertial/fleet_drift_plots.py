@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from groundstation.chapters.fleet.common import aircraft_name, plural
+from groundstation.chapters.fleet.common import aircraft_name
 from groundstation.chapters.plots.common import label
 from groundstation.chapters.plots.fleet.common import ROW_MM, left_out, log_limits, name_axis, rows_shown
+from groundstation.chapters.wording import plural
 from groundstation.plots.marks import AnyMark, Dots, Intervals
 from groundstation.plots.plot import Axis, Panel, Plot, one_panel
 from groundstation.plots.ranges import finite

@@ -5,9 +5,9 @@ from collections import Counter
 import numpy as np
 
 from groundstation.chapters.fleet.chapter import KeyFigure
-from groundstation.chapters.fleet.common import aircraft_name, bounded, day, plural
+from groundstation.chapters.fleet.common import aircraft_name, bounded, day
 from groundstation.chapters.parts import Cell, Figure, Grid, Head, Mark, Note, Part, Section
-from groundstation.chapters.wording import ABSENT, clean, is_number, number
+from groundstation.chapters.wording import ABSENT, clean, is_number, number, plural
 from groundstation.results.fleet import FleetResults
 from groundstation.results.fleet_units import RATE, UNIT_FIGURES, FleetUnitRow, UnitEventRow, UnitTrendRow
 

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from groundstation.base.units import NS_PER_S
-from groundstation.chapters.fleet.common import aircraft_name, plural
+from groundstation.chapters.fleet.common import aircraft_name
 from groundstation.chapters.plots.common import label
 from groundstation.chapters.plots.fleet.common import Places, date_axis, seconds_of
+from groundstation.chapters.wording import plural
 from groundstation.plots.marks import AnyMark, Band, Bars, Curve, Dots, Floats, Limit
 from groundstation.plots.plot import Axis, Panel, Plot, Row
 from groundstation.results.fleet import FleetResults

@@ -11,6 +11,7 @@ from groundstation.base.findings import Finding
 from groundstation.base.geodesy import SEMI_MAJOR_M
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
+from groundstation.base.words import counted
 from groundstation.systems.inertial.model import FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.tables.motion import runs
@@ -45,7 +46,7 @@ def unknown_values(flight: Flight, ins: Table, gnss: Table) -> Iterator[Finding]
             missing = others & ~mask
             if missing.any():
                 first = float(flight.seconds(table.time_ns[missing][:1])[0])
-                text = f"{name}: no usable number in {int(missing.sum())} samples that have the other channel"
+                text = f"{name}: no usable number in {counted(missing.sum(), 'sample')} that have the other channel"
                 yield Finding("warn", "inertial.unknown", text, table.topic, f"from {first:.1f} s", int(missing.sum()))
 
 

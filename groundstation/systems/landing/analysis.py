@@ -57,7 +57,7 @@ from groundstation.systems.landing.reference import (
 from groundstation.systems.landing.settings import LIMITS, LandingSettings
 from groundstation.systems.landing.stabilised import rejudge, stabilised
 from groundstation.systems.landing.touchdown import is_set_down, touchdown_of, with_evidence
-from groundstation.systems.landing.verdict_answer import verdict_words
+from groundstation.systems.landing.verdict_answer import line_of_approaches
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight
@@ -66,7 +66,6 @@ SATELLITES = "GPS"  # as recorders name the source of guidance
 TURN_S = 180.0  # before a final, in which it is turned onto the course
 SET_DOWN = "comes down too slowly to roll, as a helicopter does: no touchdown on wheels"
 MOST_ANALYSED = 50  # a log of many circuits takes no longer
-MOST_OF_A_LINE = 3  # approaches that the line of a flight tells
 
 
 @dataclass(frozen=True, eq=False)
@@ -365,19 +364,7 @@ def _rests_on(_flight: "Flight", answer: LandingResult) -> RestsOn:
 
 def _sentence(answers: Answers) -> str:
     answer = answer_of(answers, LandingResult)
-    if answer is None or answer.last is None:
-        return ""
-    others = [one for one in answer.approaches if one is not answer.last]
-    return "; ".join(sentence_of(one) for one in (answer.last, *others[: MOST_OF_A_LINE - 1]))
-
-
-def sentence_of(one: Approach) -> str:
-    """An approach in a line: its stability, else how close to the course it was."""
-    verdicts = "; ".join(verdict_words([row for row in one.stabilised if row.time_s is not None]))
-    where = f"runway {one.runway.name}" if one.runway.name else f"course {one.runway.true_course_deg:.1f} deg"
-    if not verdicts and one.established is not None:
-        return f"{one.outcome} on {where}, {one.established.lateral_rms_dots:.2f} dot RMS off the course"
-    return f"{one.outcome} on {where}{': ' + verdicts if verdicts else ''}"
+    return "" if answer is None else line_of_approaches(answer)
 
 
 LANDING = Analysis(

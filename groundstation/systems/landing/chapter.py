@@ -28,6 +28,7 @@ from groundstation.chapters.wording import (
     is_number,
     number,
     percent,
+    plural,
     sentence,
     significant,
     typeset,
@@ -44,7 +45,7 @@ from groundstation.systems.landing.answer import (
 from groundstation.systems.landing.criteria_chapter import criteria_parts
 from groundstation.systems.landing.runway_chapter import along_facts, along_told, runway_facts, with_sigma
 from groundstation.systems.landing.touchdown_chapter import SINK_TIME, touchdown_parts
-from groundstation.systems.landing.verdict_answer import verdict_words
+from groundstation.systems.landing.verdict_answer import verdict_words, worst_verdict
 
 LEAD = "How each approach was flown against its runway, and where it touched down."
 SOURCES = (
@@ -151,8 +152,7 @@ def _course(one: Approach) -> str:
 
 def _verdict(one: Approach) -> Mark:
     """Return the worse of the verdicts from both check heights."""
-    verdicts = [row.verdict for row in one.stabilised]
-    worst = next((word for word in (NOT_STABILISED, "stabilised") if word in verdicts), NOT_MEASURED)
+    worst = worst_verdict(one.stabilised)
     return Mark(TONES[worst], worst)
 
 
@@ -277,7 +277,7 @@ def _protection(one: Approach) -> Facts | None:
     pairs = (
         ("Horizontal, greatest", number(found.horizontal_max_m, 1, "m"), _limit(found.horizontal_alarm_limit_m)),
         ("Vertical, greatest", number(found.vertical_max_m, 1, "m"), _limit(found.vertical_alarm_limit_m)),
-        ("Within the alarm limits", percent(found.within_share), f"of {number(found.epochs, 0)} epochs"),
+        ("Within the alarm limits", percent(found.within_share), f"of {plural(found.epochs, 'epoch')}"),
         ("Meets the alarm limits of", "; ".join(found.operations) or ABSENT, "ICAO Annex 10, table 3.7.2.4-1"),
     )
     return Facts(f"Approach {one.number}: protection levels", pairs)

@@ -1,7 +1,7 @@
 """Page on the share of unstable approaches: by runway, by aircraft, approach by approach."""
 
 from groundstation.chapters.parts import Cell, Document, Front, Grid, Head, Mark, Note, Section, Tone
-from groundstation.chapters.wording import ABSENT, clean, number, percent, typeset
+from groundstation.chapters.wording import ABSENT, clean, number, percent, plural, typeset
 from groundstation.systems.landing.unstable_answer import Decision, UnstableApproaches, UnstableShare
 
 MARKS: dict[Decision, Mark] = {
@@ -50,7 +50,7 @@ def line(found: UnstableApproaches) -> str:
         return "No approach can be judged"
     limit = f", at most {percent(found.share_at_most)} wanted" if found.share_at_most is not None else ""
     return (
-        f"{number(whole.unstable, 0)} of {number(whole.judged, 0)} approaches unstable from "
+        f"{number(whole.unstable, 0)} of {plural(whole.judged, 'approach', 'approaches')} unstable from "
         f"{number(found.height_m, 0, 'm')} down: {_interval(whole)}{limit}"
     )
 

@@ -6,6 +6,7 @@ from dataclasses import asdict, replace
 import numpy as np
 
 from groundstation.base.errors import NotAssessableError
+from groundstation.base.words import counted
 from groundstation.methods.intervals import BOUND95
 from groundstation.methods.lag.fit import DelayFit, fit_delay
 from groundstation.methods.lag.settings import LatencySettings
@@ -99,7 +100,7 @@ def _row(pair: Pair, fit: DelayFit, unit: str, settings: LatencySettings, is_aid
     )
     if reason:
         return row
-    rests_on = f"{MOTIONS[pair[2]]} in {fit.windows} windows of {settings.window_s:g} s"
+    rests_on = f"{MOTIONS[pair[2]]} in {counted(fit.windows, 'window')} of {settings.window_s:g} s"
     if is_aided and pair[2] == "velocity":
         hidden_s = settings.aided_sigma_s
         rests_on += f"; GNSS corrects this INS, whose filter may hide {hidden_s:g} s of latency"

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from groundstation.base.units import S_PER_H
+from groundstation.base.words import counted
 from groundstation.results.roles import AzimuthByTurns, HeadingByTrack
 from groundstation.systems.known import AircraftData
 from groundstation.systems.magnetic.answer import Alignment, AlignmentSource, SourceName
@@ -208,9 +209,9 @@ def _origin(one: _Carried, runs: GroundRuns) -> str:
     name, verdict = one.source.name, one.source.verdict
     if name == "turns":
         return "azimuth by turns"
-    told = f"straight taxi ({runs.taxi.samples} epochs)" if name == "taxi" and runs.taxi else ""
+    told = f"straight taxi ({counted(runs.taxi.samples, 'epoch')})" if name == "taxi" and runs.taxi else ""
     if name == "ground run" and runs.fast:
-        told = f"ground run above {runs.speed_min_mps:.1f} m/s up to lift-off ({runs.fast.samples} epochs)"
+        told = f"ground run above {runs.speed_min_mps:.1f} m/s up to lift-off ({counted(runs.fast.samples, 'epoch')})"
     told += f", verdict {verdict}" + (" for what its interval includes" if verdict == "reject" else "")
     return told + (f", after {runs.since}" if runs.since else "")
 

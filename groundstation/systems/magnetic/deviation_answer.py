@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.errors import UsageError
 from groundstation.base.serial import MismatchError
+from groundstation.base.words import counted
 from groundstation.results.figures import FigureData
 from groundstation.results.files import csv_text, mapping
 from groundstation.results.flight import FlightResults
@@ -155,7 +156,7 @@ def deviation_from_csv(text: str, where: str) -> Deviation:
         table[int(reading)] = added
     empty = [place for place, added in enumerate(table) if math.isnan(added)]
     if empty or len(rows) != BINS:
-        found = f"no row for {empty[0]} to {empty[0] + 1} deg" if empty else f"{len(rows)} rows"
+        found = f"no row for {empty[0]} to {empty[0] + 1} deg" if empty else counted(len(rows), "row")
         raise UsageError(where, found, f"{BINS} rows, one for each degree")
     told = {name: _only(rows, name, where) for name in (FLIGHT, AIRCRAFT, METHOD, VERDICT)}
     return _checked(Deviation(told[FLIGHT], told[AIRCRAFT], told[METHOD], told[VERDICT], table_deg=tuple(table)), where)

@@ -2,7 +2,7 @@
 
 from groundstation.chapters.gates import gate_grid, setting_facts
 from groundstation.chapters.parts import Cell, Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Tone, kept
-from groundstation.chapters.wording import ABSENT, clock, is_number, number, sentence, typeset
+from groundstation.chapters.wording import ABSENT, clock, is_number, number, plural, sentence, typeset
 from groundstation.results.flight import FlightResults
 from groundstation.systems.magnetic.answer import ADVISORY, DEVIATION_CSV, STEER_CARD, MagneticResult
 from groundstation.systems.magnetic.flux_answer import FLUX_TITLES, REFERENCE_TITLES, FluxDeviation, FluxLeg
@@ -204,7 +204,11 @@ def _basis(answer: FluxDeviation) -> Facts:
     ]
     if bank.state == "found":
         pairs += [
-            ("Lean in turns", number(bank.lean, 2), f"of the bank, 95 %: {_ends(bank.lean95, 1)}; {bank.turns} turns"),
+            (
+                "Lean in turns",
+                number(bank.lean, 2),
+                f"of the bank, 95 %: {_ends(bank.lean95, 1)}; {plural(bank.turns, 'turn')}",
+            ),
             ("Lag of the display", number(bank.lag_s, 0, "s"), f"95 %: {_ends(bank.lag95_s, 0)} s"),
         ]
     else:

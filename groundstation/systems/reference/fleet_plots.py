@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from groundstation.chapters.fleet.common import plural
 from groundstation.chapters.plots.common import label
 from groundstation.chapters.plots.fleet.common import name_axis
+from groundstation.chapters.wording import plural
 from groundstation.plots.marks import AnyMark, Histogram, Intervals, Limit
 from groundstation.plots.plot import Axis, Panel, Plot, Row
 from groundstation.results.fleet import FleetCalibration, FleetResults

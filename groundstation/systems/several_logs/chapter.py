@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.words import with_half
 from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section
-from groundstation.chapters.wording import number, typeset
+from groundstation.chapters.wording import number, plural, typeset
 from groundstation.results.flight import FlightResults
 from groundstation.results.roles import StatesAlongTheFlight
 from groundstation.systems.several_logs.answer import JoinedLog, JoinedStretch, JoinMethod, Together
@@ -55,7 +55,7 @@ def together(results: FlightResults) -> Section | None:
     for one in answer.agreement:
         source = next(log for log in answer.logs if log.label == one.label)
         left = f"{number(one.residual_rms, 3, one.unit)} RMS"
-        of = f"of {number(one.motion_rms, 2, one.unit)}, {number(one.samples, 0)} samples"
+        of = f"of {number(one.motion_rms, 2, one.unit)}, {plural(one.samples, 'sample')}"
         parts.append(
             Facts("", [(f"Difference in {one.signal} of {source.topic} and {source.reference_topic}", left, of)])
         )

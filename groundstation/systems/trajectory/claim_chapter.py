@@ -20,7 +20,7 @@ from groundstation.systems.trajectory.wording_answer import (
 )
 
 MARKS: Mapping[TrajectoryState, Mark] = {
-    "accepted": Mark("good", "Accepted"),
+    "accepted": Mark("good", "Accept"),
     "doubtful": Mark("warn", "Doubtful"),
     "ambiguous": Mark("warn", "Ambiguous"),
 }

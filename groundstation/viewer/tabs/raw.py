@@ -14,6 +14,7 @@ import rerun.blueprint as rrb
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.signals import RAW_PREFIX, TOPICS, field_of, kind_of
 from groundstation.base.source_units import source_units
+from groundstation.base.words import counted
 from groundstation.chapters.markdown import table
 from groundstation.results.arrays.flight import GapRows
 from groundstation.results.flight import FlightResults
@@ -173,9 +174,9 @@ def _list(table_of_topic: Table) -> str:
         text = table(["field", "value"], [[head, column[0]] for head, column in zip(heads, cells, strict=True)])
     else:
         text = table(heads, [list(row) for row in zip(*cells, strict=True)])
-    told = [f"{len(table_of_topic)} rows, most with the same time: a list, not a series."]
+    told = [f"{counted(len(table_of_topic), 'row')}, most with the same time: a list, not a series."]
     if len(rows) < len(table_of_topic) or len(shown) < len(names):
-        told.append(f"Shown: {len(rows)} rows, {len(shown)} of {len(names)} fields.")
+        told.append(f"Shown: {counted(len(rows), 'row')}, {len(shown)} of {counted(len(names), 'field')}.")
     return "\n\n".join([" ".join(told) if len(table_of_topic) > 1 else "One record.", text])
 
 

@@ -10,13 +10,13 @@ from groundstation.pipeline.one_flight.analyse import known_of, run_analyses, se
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.systems.inertial.analysis import CAUSES, INERTIAL
 from groundstation.systems.inertial.cause_answer import CAUSES as CAUSE_NAMES
-from groundstation.systems.inertial.cause_answer import CausesResult
+from groundstation.systems.inertial.cause_answer import CauseShare, CausesResult, Within95
 from groundstation.systems.inertial.cause_arrays import CausesOverTime
 from groundstation.systems.inertial.cause_chapter import causes as chapter
 from groundstation.systems.inertial.cause_fit import fit_causes
 from groundstation.systems.inertial.cause_legs import straight_legs
 from groundstation.systems.inertial.cause_plots import along, velocity
-from groundstation.systems.inertial.causes import assess_causes, error_windows
+from groundstation.systems.inertial.causes import _sentence, assess_causes, error_windows
 from groundstation.systems.inertial.differences import InsDifferences
 from groundstation.systems.inertial.study.causes import coverage_table, study_causes, widths_table
 from groundstation.systems.inertial.study.causes_runs import CASES, CauseCell, CauseOutcome, judge_causes
@@ -239,6 +239,27 @@ def test_the_chapter_tells_every_table() -> None:
     part = data.north
     total = part.schuler_mps + part.drift_mps + part.azimuth_mps + part.body_mps + part.reset_mps + part.unexplained_mps
     assert np.nanmax(np.abs(total - part.measured_mps)) < 1e-9
+
+
+def test_a_share_above_the_whole_says_what_takes_the_rest_away() -> None:
+    """Causes cancel: 103 % of the error is no misprint, and all shares still add up to one."""
+    answer = causes()
+    values = {"drift": 1.034, "azimuth": -0.05, "unexplained": 0.016}
+    shares = tuple(
+        CauseShare(one.name, Within95(share := values.get(one.name, 0.0), share - 0.05, share + 0.05))
+        for one in answer.shares
+    )
+    assert sum(one.share.value for one in shares) == pytest.approx(1.0)
+    told = _sentence(shares, (), answer.start_mps, answer.start_tilt_arcsec, None)
+    assert told.startswith("Most of the velocity error, 103 % (98 to 108 %; the other causes take 3 % away), is")
+    section = chapter(example(replace(answer, shares=shares, sentence=told)))
+    assert section is not None and section.claim is not None
+    for text in (section.headline, section.claim.remark):
+        assert text.replace("\u202f", " ").endswith(", the other causes take 3 % away")
+    told_percent = [float(str(row[1]).replace("\u2212", "-")) for row in rows(section, "What explains the error")]
+    assert sum(told_percent) == pytest.approx(100.0, abs=2.0)
+    whole = tuple(replace(one, share=Within95(float(one.name == "drift"), 0.9, 1.1)) for one in shares)
+    assert "take" not in _sentence(whole, (), answer.start_mps, answer.start_tilt_arcsec, None)
 
 
 def test_one_flight_of_a_cell_is_judged_and_counted() -> None:

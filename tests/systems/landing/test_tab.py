@@ -10,6 +10,8 @@ import pytest
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.parts import Grid
 from groundstation.chapters.wording import sentence
+from groundstation.cli.lines import shortened
+from groundstation.pipeline.one_flight.line import verdict_first
 from groundstation.plots.marks import Curve, Dots
 from groundstation.plots.plot import Panel
 from groundstation.reports.drawing import Drawing, drawn_by
@@ -107,7 +109,10 @@ def test_terminal_findings_page_and_table_say_one_thing_with_its_side(above_path
     (one,) = run.answer.approaches
     told = "; ".join(verdict_words(one.stabilised))
     assert re.search(rf"glide path up to \d\.\d dots {side}(, .*)?: \d failed, \d held, \d not judged", told)
-    assert LANDING.sentence(by_analysis(run.answer)).endswith(told)
+    counts = re.findall(r"\d (?:failed|held|not judged)", told.split("; ")[0])
+    line = LANDING.sentence(by_analysis(run.answer))
+    assert f"glide path up to {told.split('glide path up to ')[1].split(',')[0].split(':')[0]}" in line
+    assert re.findall(r"\d (?:failed|held|not judged)", line) == counts
     (finding,) = (finding for finding in run.findings if finding.code == "landing.not_stabilised")
     assert finding.text == f"approach 1 not stabilised: {told}"
     section = landing(replace(results(True), answers=by_analysis(run.answer), figures=run.answer.figures))
@@ -118,6 +123,31 @@ def test_terminal_findings_page_and_table_say_one_thing_with_its_side(above_path
     assert values and all(value.endswith(f"dots {side}") for value in values)
     sides = {place.side for at in one.stabilised for place in at.places if place.name == "vertical"}
     assert sides == {side} == {at.lost.side for at in one.stabilised if at.lost is not None}
+
+
+def test_a_line_of_the_terminal_has_room_for_counts_and_further_approaches(with_site: FlightResults) -> None:
+    answer = with_site.answer(LandingResult)
+    assert answer is not None
+    landed = answer.approaches[-1]
+    (high, low), name = landed.stabilised, f"runway {landed.runway.name}"
+    path = replace(low.gates[0], title="glide path deviation", unit="dots", state="failed", value=1.43, name="vertical")
+    gates = (path, *(replace(one, state="passed") for one in low.gates[1:]))
+    places = (GatePlace("vertical", Place(1000.0), "high"),)
+    lost = StabilityLost(83.8, 1010.0, "glide path deviation", False, "high")
+    bad = [replace(one, verdict="not stabilised", gates=gates, places=places, lost=lost) for one in (high, low)]
+    good = tuple(replace(one, verdict="stabilised") for one in (high, low))
+    around = replace(landed, outcome="go-around", touchdown=None, stabilised=good)
+    again = replace(landed, outcome="touch-and-go", stabilised=tuple(bad))
+    approaches = (around, again, again, replace(landed, stabilised=tuple(bad)))
+    line = LANDING.sentence(by_analysis(replace(answer, approaches=approaches)))
+    last = verdict_first("Not stabilised", line)
+    held = f"{len(gates) - 1} held; go-around {name} stabilised; 2 touch-and-goes {name} not stabilised"
+    failed = "1 failed (from 84 m: glide path up to 1.4 dots high)"
+    assert last == f"not stabilised: landing {name}: {failed}, {held}"
+    narrow = shortened(last, len(last) - 10)
+    assert narrow == last.replace(" (from 84 m: glide path up to 1.4 dots high)", "")
+    told = LANDING.sentence(by_analysis(replace(answer, approaches=(replace(landed, stabilised=good),))))
+    assert told.startswith(f"landing {name} stabilised from 305 m (1000 ft): ")
 
 
 def test_limits_on_the_page_are_those_of_the_settings(with_site: FlightResults) -> None:

@@ -9,10 +9,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.chapters.fleet.common import plural, title_of
+from groundstation.chapters.fleet.common import title_of
 from groundstation.chapters.fleet.trend import QUANTITIES, changes_of, charted, flights_of
 from groundstation.chapters.plots.common import label
 from groundstation.chapters.plots.fleet.common import Places, date_axis, log_limits, seconds_of
+from groundstation.chapters.wording import plural
 from groundstation.plots.marks import AnyMark, Band, Curve, Dots, Floats, Limit, Role
 from groundstation.plots.plot import Axis, Panel, Plot, Row
 from groundstation.plots.ranges import finite, padded

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import ARCMIN_PER_DEG
-from groundstation.chapters.fleet.common import aircraft_name, bounded, day, plural
+from groundstation.chapters.fleet.common import aircraft_name, bounded, day
 from groundstation.chapters.gates import VERDICTS
 from groundstation.chapters.parts import Cell, Figure, Grid, Head, Mark, Note, Part, Section
-from groundstation.chapters.wording import ABSENT, clean, is_number, number
+from groundstation.chapters.wording import ABSENT, clean, is_number, number, plural
 from groundstation.results.fleet import FleetResults
 from groundstation.results.installations import InstallationRow
 
