@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import wait
 from pathlib import Path
@@ -270,6 +271,21 @@ def is_alive(process: int) -> bool:
 def test_many_logs_are_never_run_in_the_process_that_leads() -> None:
     few, many = (crew_for("", 1, logs, silent) for logs in (TASKS_PER_PROCESS, TASKS_PER_PROCESS + 1))
     assert (few.func, many.func) == (in_turn, side_by_side)  # recordings leave threads behind
+
+
+def test_without_recordings_a_process_serves_many_logs(tmp_path: Path) -> None:
+    jobs = [Job(tmp_path / f"{number}.csv", tmp_path, Configuration()) for number in range(TASKS_PER_PROCESS + 8)]
+    served = {}
+    for only_results in (False, True):
+        crew = crew_for("", 1, len(jobs), silent, only_results=only_results)
+        served[only_results] = Counter(outcome.text for _number, outcome in crew(enumerate(jobs), tell_process))
+    assert sorted(served[False].values()) == [8, TASKS_PER_PROCESS]
+    assert list(served[True].values()) == [len(jobs)]
+
+
+def tell_process(job: Job, _listen: Listener) -> Outcome:
+    """What the workers of the test above do."""
+    return Outcome(job.log, "done", str(os.getpid()))
 
 
 def test_an_event_of_a_worker_is_one_write_to_a_pipe() -> None:

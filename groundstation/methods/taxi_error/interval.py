@@ -325,7 +325,7 @@ def misfit(differences: HeadingDifferences, parameters: FloatArray) -> float:
     It is 1 where the differences are as noisy as the parameters say.
     """
     target = _Target(NO_STANDSTILL, differences)
-    room = noise.room_for(target.width, lanes=1)
+    room = noise.room_for(target.width)
     target.likelihood(parameters[None, :], target.last, room)
     full = np.concatenate([[1.0], -room.mean])
     squares = float(np.sum(np.outer(full, full) * room.information[0, 0]))
@@ -339,7 +339,7 @@ def sample_weights(differences: HeadingDifferences, parameters: FloatArray) -> F
     """
     target = _Target(NO_STANDSTILL, differences)
     time_s, _columns, from_north, from_east, is_start = target.taxi
-    room = noise.room_for(target.width, lanes=1, history=len(time_s))
+    room = noise.room_for(target.width, history=len(time_s))
     target.likelihood(parameters[None, :], target.last, room)
     innovation, weights = np.zeros((2, len(time_s)))
     noise.generalised_weights(time_s, from_north, from_east, is_start, parameters, room, innovation, weights)

@@ -52,61 +52,54 @@ DAMPING_MAX = 0.99
 _LOG_2PI = math.log(2.0 * math.pi)
 
 
+# Rows of the table of lanes: where each begins. Constant places let the processor keep what it works on at hand.
+_ROWS = tuple(range(0, 51 * LANES, LANES))
+WHITE2, HEADING2, MOTION_FACTOR, LOG_DETERMINANT, LOG_LIKELIHOOD = _ROWS[:5]
+START_NORTH, START_EAST, START_VARIANCE = _ROWS[5:8]  # GNSS state at the end of standstill
+Q_GNSS, Q_SWAY, Q_RATE, Q_SEGMENT, Q_WANDER = _ROWS[8:13]  # stationary variances
+KEEP_GNSS, KEEP_WANDER = _ROWS[13:15]  # shares that are left after a step
+F_22, F_23, F_32, F_33 = _ROWS[15:19]  # transition of sway and sway rate over a step
+H_NORTH, H_EAST, S, INVERSE_S = _ROWS[19:23]
+K_0, K_1, K_2, K_3, K_4, K_5 = _ROWS[23:29]
+P_00, P_10, P_11, P_20, P_21, P_22, P_30, P_31, P_32, P_33, P_23 = _ROWS[29:40]
+P_40, P_41, P_42, P_43, P_44, P_50, P_51, P_52, P_53, P_54, P_55 = _ROWS[40:51]
+
+
 class NoiseWorkspace(NamedTuple):
     """Working arrays of the loops, made once for many calls.
 
-    Of the filters, a lane for each draw: q, P, x, K, H, S and its inverse, the three noise parameters as they enter,
-    sums of products, innovations, decays, F, and what they leave; of ``solve_normal_equations``: the matrix beside its
-    inverse and the right side; the others are what ``evaluate`` hands from one to the other.
+    Of the filters, a lane for each draw: the table of lanes, states, innovations and sums of products of each column;
+    of ``solve_normal_equations``: the matrix beside its inverse and the right side; the others are what ``evaluate``
+    hands from one to the other.
     """
 
-    q: FloatArray  # (STATES, lanes)
-    P: FloatArray  # (STATES, STATES, lanes), its lower half and what is told in taxi_filter
-    x: FloatArray  # (c, STATES, lanes)
-    K: FloatArray  # (STATES, lanes)
-    H: FloatArray  # (2, lanes)
-    S: FloatArray  # (2, lanes)
-    noise: FloatArray  # (3, lanes)
-    total: FloatArray  # (c, c, lanes)
-    innovation: FloatArray  # (c, lanes)
-    keep: FloatArray  # (STATES, lanes)
-    F: FloatArray  # (2, 2, lanes)
-    turned: FloatArray  # (lanes,)
-    start: FloatArray  # (3, lanes)
+    lanes: FloatArray  # (51 LANES,), rows as named above
+    x: FloatArray  # (c, STATES LANES)
+    innovation: FloatArray  # (c, LANES)
+    total: FloatArray  # (c, c, LANES)
+    draws: FloatArray  # (LANES, 11)
     history: FloatArray  # (n, 1 + STATES) or (0, 1 + STATES)
-    log_likelihood: FloatArray  # (lanes,)
-    log_determinant: FloatArray  # (lanes,)
-    information: FloatArray  # (lanes, checkpoints, c, c)
+    information: FloatArray  # (LANES, checkpoints, c, c)
     matrix: FloatArray  # (c - 1, 2 (c - 1))
     right: FloatArray  # (c - 1,)
     mean: FloatArray  # (c - 1,)
     inverse: FloatArray  # (c - 1, c - 1)
 
 
-def room_for(width: int, checkpoints: int = 1, *, lanes: int = LANES, history: int = 0) -> NoiseWorkspace:
+def room_for(width: int, checkpoints: int = 1, *, history: int = 0) -> NoiseWorkspace:
     """Return working arrays for ``width`` columns, data and regressors.
 
     With ``history``, they hold the states of so many samples too.
     """
     rest = width - 1
     return NoiseWorkspace(
-        q=np.zeros((STATES, lanes)),
-        P=np.zeros((STATES, STATES, lanes)),
-        x=np.zeros((width, STATES, lanes)),
-        K=np.zeros((STATES, lanes)),
-        H=np.zeros((2, lanes)),
-        S=np.zeros((2, lanes)),
-        noise=np.zeros((3, lanes)),
-        total=np.zeros((width, width, lanes)),
-        innovation=np.zeros((width, lanes)),
-        keep=np.zeros((STATES, lanes)),
-        F=np.zeros((2, 2, lanes)),
-        turned=np.zeros(lanes),
-        start=np.zeros((3, lanes)),
+        lanes=np.zeros(len(_ROWS) * LANES),
+        x=np.zeros((width, STATES * LANES)),
+        innovation=np.zeros((width, LANES)),
+        total=np.zeros((width, width, LANES)),
+        draws=np.zeros((LANES, len(PARAMETER_NAMES))),
         history=np.zeros((history, 1 + STATES)),
-        log_likelihood=np.zeros(lanes),
-        log_determinant=np.zeros(lanes),
-        information=np.zeros((lanes, checkpoints, width, width)),
+        information=np.zeros((LANES, checkpoints, width, width)),
         matrix=np.zeros((rest, 2 * rest)),
         right=np.zeros(rest),
         mean=np.zeros(rest),
@@ -116,76 +109,172 @@ def room_for(width: int, checkpoints: int = 1, *, lanes: int = LANES, history: i
 
 @in_place
 def standstill_filter(
-    time_s: FloatArray, north: FloatArray, east: FloatArray, restart: int, thetas: FloatArray, room: NoiseWorkspace
+    time_s: FloatArray, north: FloatArray, east: FloatArray, restart: int, thetas: FloatArray, lanes: FloatArray
 ) -> None:
     """Compute the log likelihood of standstill velocities and the last state.
 
     The state is mean north, mean east and their variance.
 
-    ``thetas``, shape (k, 11), are as many draws as the room has lanes, or fewer; ``restart`` is the index at which the
-    filter starts afresh (a second, unconnected stretch).
+    ``thetas``, shape (LANES, 11), are the draws; ``restart`` is the index at which the filter starts afresh (a second,
+    unconnected stretch).
     """
-    lanes = len(thetas)
-    variance, white, keep, total, misfit = room.q[0], room.noise[0], room.keep[0], room.S[0], room.S[1]
-    g_north, g_east, p, log_likelihood = room.start[0], room.start[1], room.start[2], room.log_likelihood
-    for k in range(lanes):
-        white[k], variance[k] = math.exp(2.0 * thetas[k, WHITE]), math.exp(2.0 * thetas[k, CORRELATED])
-        g_north[k], g_east[k], p[k], log_likelihood[k] = 0.0, 0.0, variance[k], 0.0
+    for k in range(LANES):
+        lanes[WHITE2 + k], lanes[Q_GNSS + k] = math.exp(2.0 * thetas[k, WHITE]), math.exp(2.0 * thetas[k, CORRELATED])
+        lanes[START_NORTH + k], lanes[START_EAST + k], lanes[START_VARIANCE + k] = 0.0, 0.0, lanes[Q_GNSS + k]
+        lanes[LOG_LIKELIHOOD + k] = 0.0
     last_step = -1.0
     for i in range(len(time_s)):
         if i == restart:
-            for k in range(lanes):
-                g_north[k], g_east[k], p[k] = 0.0, 0.0, variance[k]
+            for k in range(LANES):
+                lanes[START_NORTH + k], lanes[START_EAST + k] = 0.0, 0.0
+                lanes[START_VARIANCE + k] = lanes[Q_GNSS + k]
         elif i > 0:
             step = time_s[i] - time_s[i - 1]
             if abs(step - last_step) > 1e-6:
                 last_step = step
-                for k in range(lanes):
-                    keep[k] = math.exp(-step / math.exp(thetas[k, TAU]))
-            for k in range(lanes):
-                g_north[k] *= keep[k]
-                g_east[k] *= keep[k]
-                p[k] = keep[k] * keep[k] * (p[k] - variance[k]) + variance[k]
-        for k in range(lanes):
-            total[k] = p[k] + white[k]
-            gain = p[k] / total[k]
-            v_north, v_east = north[i] - g_north[k], east[i] - g_east[k]
-            g_north[k] += gain * v_north
-            g_east[k] += gain * v_east
-            p[k] *= 1.0 - gain
-            misfit[k] = 0.5 * (v_north * v_north + v_east * v_east) / total[k]
-        for k in range(lanes):
-            log_likelihood[k] -= math.log(total[k]) + misfit[k]
-    for k in range(lanes):
-        log_likelihood[k] -= len(time_s) * _LOG_2PI
+                for k in range(LANES):
+                    lanes[KEEP_GNSS + k] = math.exp(-step / math.exp(thetas[k, TAU]))
+            for k in range(LANES):
+                keep, variance = lanes[KEEP_GNSS + k], lanes[Q_GNSS + k]
+                lanes[START_NORTH + k] *= keep
+                lanes[START_EAST + k] *= keep
+                lanes[START_VARIANCE + k] = keep * keep * (lanes[START_VARIANCE + k] - variance) + variance
+        for k in range(LANES):
+            p = lanes[START_VARIANCE + k]
+            total = p + lanes[WHITE2 + k]
+            gain = p / total
+            v_north, v_east = north[i] - lanes[START_NORTH + k], east[i] - lanes[START_EAST + k]
+            lanes[START_NORTH + k] += gain * v_north
+            lanes[START_EAST + k] += gain * v_east
+            lanes[START_VARIANCE + k] = p * (1.0 - gain)
+            lanes[S + k] = total
+            lanes[INVERSE_S + k] = 0.5 * (v_north * v_north + v_east * v_east) / total
+        for k in range(LANES):
+            lanes[LOG_LIKELIHOOD + k] -= math.log(lanes[S + k]) + lanes[INVERSE_S + k]
+    for k in range(LANES):
+        lanes[LOG_LIKELIHOOD + k] -= len(time_s) * _LOG_2PI
 
 
 @inlined
-def _oscillator(theta: FloatArray, step_s: float, F: FloatArray, lane: int) -> None:
+def _oscillator(theta: FloatArray, step_s: float, lanes: FloatArray, k: int) -> None:
     """Write the exact transition of sway and its rate over a step.
 
-    It goes into a lane of F, shape (2, 2, lanes).
+    It goes into lane ``k`` of the table.
     """
     natural = 2.0 * math.pi * math.exp(theta[FREQUENCY])
     zeta = min(math.exp(theta[DAMPING]), DAMPING_MAX)
     decay, damped = zeta * natural, natural * math.sqrt(1.0 - zeta * zeta)
     shrink, sine, cosine = math.exp(-decay * step_s), math.sin(damped * step_s), math.cos(damped * step_s)
-    F[0, 0, lane], F[0, 1, lane] = shrink * (cosine + decay / damped * sine), shrink * sine / damped
-    F[1, 0, lane], F[1, 1, lane] = -natural * natural * F[0, 1, lane], shrink * (cosine - decay / damped * sine)
+    lanes[F_22 + k], lanes[F_23 + k] = shrink * (cosine + decay / damped * sine), shrink * sine / damped
+    lanes[F_32 + k], lanes[F_33 + k] = -natural * natural * lanes[F_23 + k], shrink * (cosine - decay / damped * sine)
 
 
 @in_place
-def _turn(F: FloatArray, sway: FloatArray, rate: FloatArray, turned: FloatArray, lanes: int) -> None:
-    """Carry sway and sway rate, each of shape (lanes,), over a step.
+def _begin(thetas: FloatArray, start_gap_s: float, lanes: FloatArray) -> None:
+    """Write noise and the covariance before the first sample, and a transition that changes nothing."""
+    for at in range(P_00, P_55 + LANES):
+        lanes[at] = 0.0
+    for k in range(LANES):
+        theta = thetas[k]
+        lanes[WHITE2 + k], lanes[HEADING2 + k] = math.exp(2.0 * theta[WHITE]), math.exp(2.0 * theta[HEADING_WHITE])
+        lanes[MOTION_FACTOR + k], lanes[LOG_DETERMINANT + k] = math.exp(theta[MOTION]), 0.0
+        lanes[Q_GNSS + k], lanes[Q_SWAY + k] = math.exp(2.0 * theta[CORRELATED]), math.exp(2.0 * theta[SWAY])
+        lanes[Q_RATE + k] = lanes[Q_SWAY + k] * (2.0 * math.pi * math.exp(theta[FREQUENCY])) ** 2
+        lanes[Q_SEGMENT + k], lanes[Q_WANDER + k] = math.exp(2.0 * theta[SEGMENT]), math.exp(2.0 * theta[WANDER])
+        lanes[P_00 + k], lanes[P_11 + k] = lanes[Q_GNSS + k], lanes[Q_GNSS + k]
+        lanes[P_22 + k], lanes[P_33 + k] = lanes[Q_SWAY + k], lanes[Q_RATE + k]
+        lanes[P_44 + k], lanes[P_55 + k] = lanes[Q_SEGMENT + k], lanes[Q_WANDER + k]
+        lanes[KEEP_GNSS + k] = lanes[KEEP_WANDER + k] = lanes[F_22 + k] = lanes[F_33 + k] = 1.0
+        lanes[F_23 + k] = lanes[F_32 + k] = 0.0
+        if start_gap_s >= 0.0:
+            kept, q = math.exp(-start_gap_s / math.exp(theta[TAU])), lanes[Q_GNSS + k]
+            lanes[P_00 + k] = lanes[P_11 + k] = kept * kept * (lanes[START_VARIANCE + k] - q) + q
 
-    ``turned`` is working space for one of them.
+
+@in_place
+def _carry_covariance(lanes: FloatArray, fresh: float) -> None:
+    """Carry the covariance over a step; ``fresh`` is 0 where a segment begins, else 1.
+
+    Stationary covariance is diagonal, so only the deviation from it is moved: no process-noise matrix.
     """
-    for k in range(lanes):
-        turned[k] = F[0, 0, k] * sway[k] + F[0, 1, k] * rate[k]
-    for k in range(lanes):
-        rate[k] = F[1, 0, k] * sway[k] + F[1, 1, k] * rate[k]
-    for k in range(lanes):
-        sway[k] = turned[k]
+    for k in range(LANES):
+        gnss, wander = lanes[KEEP_GNSS + k], lanes[KEEP_WANDER + k]
+        f22, f23, f32, f33 = lanes[F_22 + k], lanes[F_23 + k], lanes[F_32 + k], lanes[F_33 + k]
+        lanes[P_00 + k] = (lanes[P_00 + k] - lanes[Q_GNSS + k]) * (gnss * gnss) + lanes[Q_GNSS + k]
+        lanes[P_10 + k] *= gnss * gnss
+        lanes[P_11 + k] = (lanes[P_11 + k] - lanes[Q_GNSS + k]) * (gnss * gnss) + lanes[Q_GNSS + k]
+        p20, p30 = lanes[P_20 + k], lanes[P_30 + k]
+        lanes[P_20 + k], lanes[P_30 + k] = (f22 * p20 + f23 * p30) * gnss, (f32 * p20 + f33 * p30) * gnss
+        p21, p31 = lanes[P_21 + k], lanes[P_31 + k]
+        lanes[P_21 + k], lanes[P_31 + k] = (f22 * p21 + f23 * p31) * gnss, (f32 * p21 + f33 * p31) * gnss
+        sway, rate = lanes[P_22 + k] - lanes[Q_SWAY + k], lanes[P_33 + k] - lanes[Q_RATE + k]
+        turned22, turned32 = f22 * sway + f23 * lanes[P_32 + k], f32 * sway + f33 * lanes[P_32 + k]
+        turned23, turned33 = f22 * lanes[P_23 + k] + f23 * rate, f32 * lanes[P_23 + k] + f33 * rate
+        lanes[P_22 + k] = f22 * turned22 + f23 * turned23 + lanes[Q_SWAY + k]
+        lanes[P_23 + k] = f32 * turned22 + f33 * turned23
+        lanes[P_32 + k] = f22 * turned32 + f23 * turned33
+        lanes[P_33 + k] = f32 * turned32 + f33 * turned33 + lanes[Q_RATE + k]
+        p42, p43, p52, p53 = lanes[P_42 + k], lanes[P_43 + k], lanes[P_52 + k], lanes[P_53 + k]
+        lanes[P_40 + k] *= fresh * gnss
+        lanes[P_41 + k] *= fresh * gnss
+        lanes[P_42 + k], lanes[P_43 + k] = (f22 * p42 + f23 * p43) * fresh, (f32 * p42 + f33 * p43) * fresh
+        lanes[P_44 + k] = (lanes[P_44 + k] - lanes[Q_SEGMENT + k]) * (fresh * fresh) + lanes[Q_SEGMENT + k]
+        lanes[P_50 + k] *= wander * gnss
+        lanes[P_51 + k] *= wander * gnss
+        lanes[P_52 + k], lanes[P_53 + k] = (f22 * p52 + f23 * p53) * wander, (f32 * p52 + f33 * p53) * wander
+        lanes[P_54 + k] *= wander * fresh
+        lanes[P_55 + k] = (lanes[P_55 + k] - lanes[Q_WANDER + k]) * (wander * wander) + lanes[Q_WANDER + k]
+
+
+@in_place
+def _measure(lanes: FloatArray, from_north: float, from_east: float) -> None:
+    """Take a sample into the covariance; leaves H, S, 1 / S and K."""
+    for k in range(LANES):
+        h0, h1 = lanes[MOTION_FACTOR + k] * from_north, lanes[MOTION_FACTOR + k] * from_east
+        p10, p20, p21, p32 = lanes[P_10 + k], lanes[P_20 + k], lanes[P_21 + k], lanes[P_32 + k]
+        p40, p41, p42, p43 = lanes[P_40 + k], lanes[P_41 + k], lanes[P_42 + k], lanes[P_43 + k]
+        p50, p51, p52, p53 = lanes[P_50 + k], lanes[P_51 + k], lanes[P_52 + k], lanes[P_53 + k]
+        p54 = lanes[P_54 + k]
+        k0 = lanes[P_00 + k] * h0 + p10 * h1 + p20 + p40 + p50
+        k1 = p10 * h0 + lanes[P_11 + k] * h1 + p21 + p41 + p51
+        k2 = p20 * h0 + p21 * h1 + lanes[P_22 + k] + p42 + p52
+        k3 = lanes[P_30 + k] * h0 + lanes[P_31 + k] * h1 + p32 + p43 + p53
+        k4 = p40 * h0 + p41 * h1 + p42 + lanes[P_44 + k] + p54
+        k5 = p50 * h0 + p51 * h1 + p52 + p54 + lanes[P_55 + k]
+        of_white = lanes[WHITE2 + k] * (from_north * from_north + from_east * from_east) + lanes[HEADING2 + k]
+        s = of_white + h0 * k0 + h1 * k1 + k2 + k4 + k5
+        inverse = 1.0 / s
+        lanes[H_NORTH + k], lanes[H_EAST + k], lanes[S + k], lanes[INVERSE_S + k] = h0, h1, s, inverse
+        lanes[P_00 + k] -= k0 * k0 * inverse
+        lanes[P_10 + k], lanes[P_11 + k] = p10 - k1 * k0 * inverse, lanes[P_11 + k] - k1 * k1 * inverse
+        lanes[P_20 + k], lanes[P_21 + k] = p20 - k2 * k0 * inverse, p21 - k2 * k1 * inverse
+        lanes[P_22 + k], lanes[P_23 + k] = lanes[P_22 + k] - k2 * k2 * inverse, lanes[P_23 + k] - k2 * k3 * inverse
+        lanes[P_30 + k], lanes[P_31 + k] = lanes[P_30 + k] - k3 * k0 * inverse, lanes[P_31 + k] - k3 * k1 * inverse
+        lanes[P_32 + k], lanes[P_33 + k] = p32 - k3 * k2 * inverse, lanes[P_33 + k] - k3 * k3 * inverse
+        lanes[P_40 + k], lanes[P_41 + k] = p40 - k4 * k0 * inverse, p41 - k4 * k1 * inverse
+        lanes[P_42 + k], lanes[P_43 + k] = p42 - k4 * k2 * inverse, p43 - k4 * k3 * inverse
+        lanes[P_44 + k] -= k4 * k4 * inverse
+        lanes[P_50 + k], lanes[P_51 + k] = p50 - k5 * k0 * inverse, p51 - k5 * k1 * inverse
+        lanes[P_52 + k], lanes[P_53 + k] = p52 - k5 * k2 * inverse, p53 - k5 * k3 * inverse
+        lanes[P_54 + k], lanes[P_55 + k] = p54 - k5 * k4 * inverse, lanes[P_55 + k] - k5 * k5 * inverse
+        lanes[K_0 + k], lanes[K_1 + k], lanes[K_2 + k] = k0 * inverse, k1 * inverse, k2 * inverse
+        lanes[K_3 + k], lanes[K_4 + k], lanes[K_5 + k] = k3 * inverse, k4 * inverse, k5 * inverse
+
+
+@in_place
+def _filter_column(measured: float, fresh: float, lanes: FloatArray, x: FloatArray, innovation: FloatArray) -> None:
+    """Carry the states of a column over a step, and correct them by its sample; leaves the innovations."""
+    for k in range(LANES):
+        sway, rate = x[2 * LANES + k], x[3 * LANES + k]
+        x0, x1 = x[k] * lanes[KEEP_GNSS + k], x[LANES + k] * lanes[KEEP_GNSS + k]
+        x2 = lanes[F_22 + k] * sway + lanes[F_23 + k] * rate
+        x3 = lanes[F_32 + k] * sway + lanes[F_33 + k] * rate
+        x4, x5 = x[4 * LANES + k] * fresh, x[5 * LANES + k] * lanes[KEEP_WANDER + k]
+        left = measured - lanes[H_NORTH + k] * x0 - lanes[H_EAST + k] * x1 - x2 - x4 - x5
+        innovation[k] = left
+        x[k], x[LANES + k] = x0 + lanes[K_0 + k] * left, x1 + lanes[K_1 + k] * left
+        x[2 * LANES + k], x[3 * LANES + k] = x2 + lanes[K_2 + k] * left, x3 + lanes[K_3 + k] * left
+        x[4 * LANES + k], x[5 * LANES + k] = x4 + lanes[K_4 + k] * left, x5 + lanes[K_5 + k] * left
 
 
 @in_place
@@ -216,118 +305,56 @@ def taxi_filter(
     is_start : ndarray of bool, shape (n,)
         First sample of a segment: its own error is drawn afresh there.
     start_gap_s
-        Time since the standstill state ``room.start`` (mean north, mean east, variance); negative: no standstill.
-    thetas : ndarray, shape (k, 11)
-        As many draws as the room has lanes, or fewer.
+        Time since the standstill state in the table of lanes; negative: no standstill.
+    thetas : ndarray, shape (LANES, 11)
     checkpoints : ndarray of int64, shape (m,)
         Numbers of samples, increasing.
     room : NoiseWorkspace
         Where it has room for the history, S and K of every sample, of the first draw, are written.
 
     Letters: P covariance and x states in the order of ``STATES``; q stationary variances; S innovation variance
-    (deg^2), K gain, H measurement, F the transition of the oscillator, the other states decaying by ``keep``. P is
+    (deg^2), K gain, H measurement, F the transition of the oscillator, the other states decaying by what is kept. P is
     symmetric, so its lower half is carried; of sway and sway rate also [2, 3], which is [3, 2] but for rounding.
     """
-    lanes, width, states = len(thetas), columns.shape[1], len(room.keep)
-    q, P, x, K, H, S, inverse = room.q, room.P, room.x, room.K, room.H, room.S[0], room.S[1]
-    white2, heading2, motion = room.noise[0], room.noise[1], room.noise[2]
-    total, innovation, keep, F, log_determinant = room.total, room.innovation, room.keep, room.F, room.log_determinant
+    width, lanes, x, total, innovation = columns.shape[1], room.lanes, room.x, room.total, room.innovation
     history = room.history
-    for k in range(lanes):
-        theta = thetas[k]
-        white2[k], heading2[k] = math.exp(2.0 * theta[WHITE]), math.exp(2.0 * theta[HEADING_WHITE])
-        motion[k] = math.exp(theta[MOTION])
-        q[0, k] = q[1, k] = math.exp(2.0 * theta[CORRELATED])
-        q[2, k] = math.exp(2.0 * theta[SWAY])
-        q[3, k] = q[2, k] * (2.0 * math.pi * math.exp(theta[FREQUENCY])) ** 2
-        q[4, k], q[5, k] = math.exp(2.0 * theta[SEGMENT]), math.exp(2.0 * theta[WANDER])
-        log_determinant[k] = 0.0
-        for a in range(states):
-            for b in range(states):
-                P[a, b, k] = 0.0
-            P[a, a, k], keep[a, k] = q[a, k], 1.0
-        for j in range(width):
-            for a in range(states):
-                x[j, a, k] = 0.0
-            for m in range(width):
+    _begin(thetas, start_gap_s, lanes)
+    for j in range(width):
+        for at in range(STATES * LANES):
+            x[j, at] = 0.0
+        for m in range(width):
+            for k in range(LANES):
                 total[j, m, k] = 0.0
-        if start_gap_s >= 0.0:
-            kept = math.exp(-start_gap_s / math.exp(theta[TAU]))
-            P[0, 0, k] = P[1, 1, k] = kept * kept * (room.start[2, k] - q[0, k]) + q[0, k]
-            x[0, 0, k], x[0, 1, k] = kept * room.start[0, k], kept * room.start[1, k]
-    last_step, written = -1.0, 0
+    if start_gap_s >= 0.0:
+        for k in range(LANES):
+            kept = math.exp(-start_gap_s / math.exp(thetas[k, TAU]))
+            x[0, k], x[0, LANES + k] = kept * lanes[START_NORTH + k], kept * lanes[START_EAST + k]
+    last_step, written, fresh = -1.0, 0, 1.0
     for i in range(len(time_s)):
         if i > 0:
             step = time_s[i] - time_s[i - 1]
             if abs(step - last_step) > 1e-6:
                 last_step = step
-                for k in range(lanes):
-                    theta = thetas[k]
-                    keep[0, k] = keep[1, k] = math.exp(-step / math.exp(theta[TAU]))
-                    keep[5, k] = math.exp(-step / math.exp(theta[WANDER_TAU]))
-                    _oscillator(theta, step, F, k)
+                for k in range(LANES):
+                    lanes[KEEP_GNSS + k] = math.exp(-step / math.exp(thetas[k, TAU]))
+                    lanes[KEEP_WANDER + k] = math.exp(-step / math.exp(thetas[k, WANDER_TAU]))
+                    _oscillator(thetas[k], step, lanes, k)
             fresh = 0.0 if is_start[i] else 1.0
-            for k in range(lanes):
-                keep[4, k] = fresh
-            # Stationary covariance is diagonal, so only the deviation from it is moved: no process-noise matrix.
-            for a in range(states):
-                for k in range(lanes):
-                    P[a, a, k] -= q[a, k]
-            for b in range(4):
-                _turn(F, P[2, b], P[3, b], room.turned, lanes)
-            for a in range(2, states):
-                _turn(F, P[a, 2], P[a, 3], room.turned, lanes)
-            for a in range(states):
-                for b in range(a + 1):
-                    for k in range(lanes):
-                        P[a, b, k] *= keep[a, k] * keep[b, k]
-            for a in range(states):
-                for k in range(lanes):
-                    P[a, a, k] += q[a, k]
-            for j in range(width):
-                _turn(F, x[j, 2], x[j, 3], room.turned, lanes)
-                for a in range(states):
-                    for k in range(lanes):
-                        x[j, a, k] *= keep[a, k]
-        for k in range(lanes):
-            H[0, k], H[1, k] = motion[k] * from_north[i], motion[k] * from_east[i]
-            S[k] = white2[k] * (from_north[i] * from_north[i] + from_east[i] * from_east[i]) + heading2[k]
-        for a in range(states):
-            north, east, sway = P[a, 0], P[max(a, 1), min(a, 1)], P[max(a, 2), min(a, 2)]
-            segment, wander = P[max(a, 4), min(a, 4)], P[5, a]
-            for k in range(lanes):
-                K[a, k] = north[k] * H[0, k] + east[k] * H[1, k] + sway[k] + segment[k] + wander[k]
-        for k in range(lanes):
-            S[k] = S[k] + H[0, k] * K[0, k] + H[1, k] * K[1, k] + K[2, k] + K[4, k] + K[5, k]
-            inverse[k] = 1.0 / S[k]
-        for k in range(lanes):
-            log_determinant[k] += math.log(S[k])
-        for k in range(lanes):
-            P[2, 3, k] -= K[2, k] * K[3, k] * inverse[k]
-        for a in range(states):
-            for b in range(a + 1):
-                for k in range(lanes):
-                    P[a, b, k] -= K[a, k] * K[b, k] * inverse[k]
-        for a in range(states):
-            for k in range(lanes):
-                K[a, k] *= inverse[k]
+            _carry_covariance(lanes, fresh)
+        _measure(lanes, from_north[i], from_east[i])
+        for k in range(LANES):
+            lanes[LOG_DETERMINANT + k] += math.log(lanes[S + k])
         if len(history) > 0:
-            history[i, 0] = S[0]
-            for a in range(states):  # a slice would take as long to compile as all the rest
-                history[i, 1 + a] = K[a, 0]
+            history[i, 0] = lanes[S]
+            for a in range(STATES):  # a slice would take as long to compile as all the rest
+                history[i, 1 + a] = lanes[K_0 + a * LANES]
         for j in range(width):
-            for k in range(lanes):
-                innovation[j, k] = (
-                    columns[i, j] - H[0, k] * x[j, 0, k] - H[1, k] * x[j, 1, k] - x[j, 2, k] - x[j, 4, k] - x[j, 5, k]
-                )
-            for a in range(states):
-                for k in range(lanes):
-                    x[j, a, k] += K[a, k] * innovation[j, k]
+            _filter_column(columns[i, j], fresh, lanes, x[j], innovation[j])
             for m in range(j + 1):
-                for k in range(lanes):
-                    total[j, m, k] += innovation[j, k] * innovation[m, k] * inverse[k]
+                for k in range(LANES):
+                    total[j, m, k] += innovation[j, k] * innovation[m, k] * lanes[INVERSE_S + k]
         if written < len(checkpoints) and i + 1 == checkpoints[written]:
-            for k in range(lanes):
+            for k in range(LANES):
                 for j in range(width):
                     for m in range(j + 1):
                         room.information[k, written, j, m] = total[j, m, k]
@@ -350,38 +377,40 @@ def generalised_weights(
 
     The weights are the row sums of the inverse covariance: the gradient of half the quadratic form of a constant,
     taken backwards through the filter whose history (S and K) is in the room. Letters as in ``taxi_filter``; r is the
-    gradient with respect to the state. ``innovation`` of shape (n,) is room to work in, as are the room's first lanes.
+    gradient with respect to the state. ``innovation`` of shape (n,) is room to work in, as are the room's first states.
     """
     count, motion = len(time_s), math.exp(theta[MOTION])
-    H, x, r, keep, F, history = room.q, room.x[0], room.K, room.keep, room.F, room.history
+    lanes, history, states = room.lanes, room.history, room.x[0]
+    keep, H, x, r = states[:STATES], states[STATES : 2 * STATES], states[2 * STATES : 3 * STATES], states[-STATES:]
     for a in range(STATES):
-        H[a, 0], x[a, 0], r[a, 0], keep[a, 0] = 0.0, 0.0, 0.0, 1.0
-    H[2, 0] = H[4, 0] = H[5, 0] = 1.0
+        H[a], x[a], r[a], keep[a] = 0.0, 0.0, 0.0, 1.0
+    H[2] = H[4] = H[5] = 1.0
     for turn in range(2 * count):
         is_forward = turn < count
         i = turn if is_forward else 2 * count - 1 - turn
         step = time_s[i] - time_s[i - 1] if i > 0 else 0.0
-        keep[0, 0] = keep[1, 0] = math.exp(-step / math.exp(theta[TAU]))
-        keep[5, 0] = math.exp(-step / math.exp(theta[WANDER_TAU]))
-        keep[4, 0] = 0.0 if is_start[i] else 1.0
-        _oscillator(theta, step, F, 0)
-        H[0, 0], H[1, 0] = motion * from_north[i], motion * from_east[i]
+        keep[0] = keep[1] = math.exp(-step / math.exp(theta[TAU]))
+        keep[5] = math.exp(-step / math.exp(theta[WANDER_TAU]))
+        keep[4] = 0.0 if is_start[i] else 1.0
+        _oscillator(theta, step, lanes, 0)
+        H[0], H[1] = motion * from_north[i], motion * from_east[i]
         if is_forward:
-            _turn(F, x[2], x[3], room.turned, 1)
+            sway, rate = x[2], x[3]
+            x[2], x[3] = lanes[F_22] * sway + lanes[F_23] * rate, lanes[F_32] * sway + lanes[F_33] * rate
             innovation[i] = 1.0
             for a in range(STATES):
-                x[a, 0] *= keep[a, 0]
-                innovation[i] -= H[a, 0] * x[a, 0]
+                x[a] *= keep[a]
+                innovation[i] -= H[a] * x[a]
             for a in range(STATES):
-                x[a, 0] += history[i, 1 + a] * innovation[i]
+                x[a] += history[i, 1 + a] * innovation[i]
         else:
             weights[i] = innovation[i] / history[i, 0]
             for a in range(STATES):
-                weights[i] += history[i, 1 + a] * r[a, 0]
+                weights[i] += history[i, 1 + a] * r[a]
             for a in range(STATES):
-                r[a, 0] = (r[a, 0] - H[a, 0] * weights[i]) * keep[a, 0]
-            sway, rate = r[2, 0], r[3, 0]
-            r[2, 0], r[3, 0] = F[0, 0, 0] * sway + F[1, 0, 0] * rate, F[0, 1, 0] * sway + F[1, 1, 0] * rate
+                r[a] = (r[a] - H[a] * weights[i]) * keep[a]
+            sway, rate = r[2], r[3]
+            r[2], r[3] = lanes[F_22] * sway + lanes[F_32] * rate, lanes[F_23] * sway + lanes[F_33] * rate
     total = 0.0
     for i in range(count):
         total += weights[i]
@@ -474,13 +503,15 @@ def evaluate(
         Out: the first coefficient and its variance, were the coefficients after the first ``a`` known to be zero.
     """
     width, last = taxi[1].shape[1], len(checkpoints) - 1
-    information, mean, inverse = room.information, room.mean, room.inverse
-    first, lanes = 0, len(room.S[0])
-    while first < len(thetas):
-        some = thetas[first : first + lanes]
-        standstill_filter(standstill[0], standstill[1], standstill[2], standstill[3], some, room)
-        taxi_filter(taxi[0], taxi[1], taxi[2], taxi[3], taxi[4], standstill[4], some, checkpoints, room)
-        for lane in range(len(some)):
+    information, mean, inverse, draws, lanes = room.information, room.mean, room.inverse, room.draws, room.lanes
+    for first in range(0, len(thetas), LANES):
+        count = min(LANES, len(thetas) - first)
+        for lane in range(LANES):  # those left over repeat the last draw
+            for at in range(thetas.shape[1]):
+                draws[lane, at] = thetas[first + min(lane, count - 1), at]
+        standstill_filter(standstill[0], standstill[1], standstill[2], standstill[3], draws, lanes)
+        taxi_filter(taxi[0], taxi[1], taxi[2], taxi[3], taxi[4], standstill[4], draws, checkpoints, room)
+        for lane in range(count):
             k, rest = first + lane, 0.0
             for m in range(len(checkpoints)):
                 rest = solve_normal_equations(information[lane, m], prior[0], prior[1], mean, inverse, room)
@@ -488,9 +519,8 @@ def evaluate(
                     variance[k, m, j] = inverse[j, j]
             for j in range(width - 1):
                 estimate[k, j] = mean[j]
-            log_likelihood[k] = room.log_likelihood[lane] - 0.5 * (room.log_determinant[lane] + rest)
+            log_likelihood[k] = lanes[LOG_LIKELIHOOD + lane] - 0.5 * (lanes[LOG_DETERMINANT + lane] + rest)
             if len(prior_of_alone[0]) < width - 1:
                 means, precisions = prior_of_alone
                 solve_normal_equations(information[lane, last], means, precisions, mean, inverse, room)
             alone[k, 0], alone[k, 1] = mean[0], inverse[0, 0]
-        first += lanes

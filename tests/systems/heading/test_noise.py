@@ -73,6 +73,18 @@ def test_filter_gives_the_dense_least_squares(seed: int) -> None:
     assert sigma == pytest.approx(np.sqrt(np.diag(np.linalg.inv(information))), rel=DENSE_TOLERANCE)
 
 
+def test_each_draw_is_judged_as_if_it_were_alone() -> None:
+    rng = np.random.default_rng(9)
+    data = random_differences(rng)
+    still = StandstillVelocities(np.arange(40) * 0.2 - 20.0, *rng.normal(0.0, 0.05, (2, 40)), gap_s=1.0)
+    target = _Target(still, data)
+    thetas = np.array([draw_theta(rng) for _ in range(noise.LANES + 7)])
+    together = target.evaluate(thetas, target.last)
+    for draw, theta in enumerate(thetas):
+        alone = target.evaluate(theta[None, :], target.last)
+        assert all(np.array_equal(a[draw], b[0]) for a, b in zip(together, alone, strict=True))
+
+
 def test_weights_are_the_row_sums_of_the_inverse_covariance() -> None:
     rng = np.random.default_rng(4)
     data, theta = random_differences(rng), draw_theta(rng)

@@ -25,6 +25,7 @@ from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 
 TASKS_PER_PROCESS = 32  # Rerun leaves a few threads behind for every recording
+RESULTS_PER_PROCESS = 512  # without recordings a process does not grow, and a new one imports for a second
 MOST_EVENT_CHARACTERS = 160  # of a name or a text: an event is one write to a pipe, 4096 bytes that nothing cuts in two
 LOOK_EVERY_S, END_S = 0.2, 5.0  # for jobs that take too long; given to their processes to end
 _END = b""
@@ -43,6 +44,7 @@ def side_by_side(
     workers: int,
     listen: Listener,
     timeout_s: float = math.inf,
+    tasks_per_process: int = TASKS_PER_PROCESS,
 ) -> Generator[tuple[int, Outcome]]:
     """Run jobs in several processes; yields number and outcome as each one ends.
 
@@ -51,13 +53,14 @@ def side_by_side(
     longer than ``timeout_s`` has failed, too; its pool is ended, and what else was in it is run again as it was.
     """
     queue = _Queue(iter(tasks))
+    until_broken = partial(_until_broken, timeout_s=timeout_s, tasks_per_process=tasks_per_process)
     with _events(listen, queue) as sender:
         while True:
             suspects: list[tuple[int, AnyJob]] = []
-            yield from _until_broken(queue, run, workers, sender, suspects, timeout_s)
+            yield from until_broken(queue, run, workers, sender, suspects)
             for task in suspects:
                 broken: list[tuple[int, AnyJob]] = []
-                yield from _until_broken(_Queue(iter((task,)), queue.begun), run, 1, sender, broken, timeout_s)
+                yield from until_broken(_Queue(iter((task,)), queue.begun), run, 1, sender, broken)
                 for number, job in broken:
                     reason = f"{job.name}: its process died (killed, or out of memory)"
                     yield number, Outcome(job.log, "failed", reason)
@@ -102,6 +105,7 @@ def _until_broken(
     sender: Connection,
     broken: list[tuple[int, AnyJob]],
     timeout_s: float,
+    tasks_per_process: int,
 ) -> Generator[tuple[int, Outcome]]:
     """Run jobs until there are none, or until a process dies.
 
@@ -110,7 +114,7 @@ def _until_broken(
     Where a job takes too long, those that were in the pool with it are in the queue again.
     """
     pool = ProcessPoolExecutor(
-        workers, mp_context=_CONTEXT, initializer=_begin, initargs=(sender,), max_tasks_per_child=TASKS_PER_PROCESS
+        workers, mp_context=_CONTEXT, initializer=_begin, initargs=(sender,), max_tasks_per_child=tasks_per_process
     )
     running: dict[Future[Outcome], tuple[int, AnyJob]] = {}
 

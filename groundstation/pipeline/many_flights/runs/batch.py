@@ -118,7 +118,7 @@ def run_many(
     skipped = skipped_files(inputs, strangers) if is_near and configuration.profile is None else {}
     logs = len(inputs) - len(skipped)
     bounds = bounds_of(configuration.isolation, timeout_s) if is_isolated else None
-    crew = crew_for(scheduler, jobs or cores(), logs, listen, timeout_s, bounds)
+    crew = crew_for(scheduler, jobs or cores(), logs, listen, timeout_s, bounds, only_results=only_results)
     make = partial(
         Job,
         configuration=configuration,
