@@ -284,7 +284,7 @@ def test_every_algorithm_has_a_title() -> None:
 
 def test_the_front_says_what_was_found(results: FlightResults, answer: CooperativeResult) -> None:
     best, top = trusted(answer), front(results)
-    assert top == session_front(results, tuple(top.pairs))
+    assert top.legend and replace(top, legend=()) == session_front(results, tuple(top.pairs))
     assert top.title == "Session of A, B, C"
     assert top.headline.startswith(f"{TITLES[best.algorithm]}: 2σ_r ")
     assert {label: value for label, value, _ in top.figures}.keys() >= {
