@@ -258,9 +258,19 @@ def _fits_egi(data: Data1553) -> bool:
 
 
 def _fits_b100(data: Data1553) -> bool:
-    """Tell whether the unused words are zero and there is a position."""
+    """Tell whether the unused words are zero and there is a position.
+
+    Without a position its flag says so and its words are zero, while heading, attitude and velocity are flagged valid.
+    """
     unused = [1, *range(16, 20), *range(25, 32)]
-    return not data[:, unused].any() and _is_position(*_named_values(data, "b100", "latitude", "longitude"))
+    if data[:, unused].any():
+        return False
+    if data[:, 20:24].any():
+        return _is_position(*_named_values(data, "b100", "latitude", "longitude"))
+    names = ("position", "velocity", "true_heading", "attitude")
+    position, *others = _named_values(data, "b100", *(f"{name}_valid" for name in names))
+    is_told = bool(not position.any() and all(one.all() for one in others))
+    return is_told and bool(data[:, 2:8].any() and data[:, 9:11].any() and data[:, 11].any())
 
 
 def _fits_f15(data: Data1553) -> bool:
