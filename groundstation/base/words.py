@@ -18,7 +18,9 @@ def listed(names: Sequence[str]) -> str:
 
 
 def counted(number: float, noun: str, nouns: str = "") -> str:
-    """Return a number with its noun, in the plural but for one; ``nouns`` where it is no mere s.
+    """Return a number with its noun, in the plural but for one.
+
+    ``nouns`` is the plural where it is not the noun with an s.
 
     Examples
     --------

@@ -48,7 +48,7 @@ def recognise(source: Source) -> str | None:
 
 
 def is_archive(source: Source) -> bool:
-    """Tell whether a file is an archive of files: a log that is stored in it is not the file itself."""
+    """Tell whether a file is an archive; a log stored in one is not the file itself."""
     return recognise(source) in HOLD_FILES
 
 

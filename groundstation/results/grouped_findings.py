@@ -71,13 +71,13 @@ def named_lines(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def _line(alike: Sequence[Finding], body: str) -> str:
-    """Return the text of findings that differ in their topics alone, behind those that it does not name."""
+    """Return the text of equal findings behind the topics that it does not name."""
     topics = list(dict.fromkeys(one.topic for one in alike if one.topic and not _names(body, one.topic)))
     return f"{_named(topics)}: {body}" if topics else body
 
 
 def _names(text: str, topic: str) -> bool:
-    """Tell whether a text names a topic, by itself or with a field; ``ins.2`` does not name ``ins``."""
+    """Tell whether a text names a topic or a field of it; ``ins.2`` does not name ``ins``."""
     name = re.escape(topic.removeprefix(RAW_PREFIX))
     return re.search(rf"(?<!\w){name}(?!\w|\.\d)", text) is not None
 

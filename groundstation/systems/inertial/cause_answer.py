@@ -62,7 +62,7 @@ class CauseShare:
 
 
 def taken_away(share: float) -> str:
-    """Return what the other causes do to a share above the whole error; empty of a share within it.
+    """Return what other causes take from a share above the whole error; empty of others.
 
     Examples
     --------

@@ -20,7 +20,7 @@ _BRACKETS = re.compile(r" \([^()]*\)")  # within which there is no room for brac
 
 
 def line_of_approaches(answer: LandingResult) -> str:
-    """Return the approaches of a flight in a line: the last landing, then the others in a few words."""
+    """Return the approaches of a flight in a line, the last landing first."""
     if answer.last is None:
         return ""
     others = Counter(
