@@ -115,7 +115,7 @@ def test_a_folder_without_a_log_is_refused(tmp_path: Path) -> None:
     (tmp_path / "readme.txt").write_text("nothing\n", encoding="utf-8")
     for verb in ("check", "info"):
         code, _out, told = groundstation(verb, str(tmp_path))
-        assert code == 2 and "no log among 1 files, expected a log, or a folder with logs" in told
+        assert code == 2 and "no log among 1 file, expected a log, or a folder with logs" in told
 
 
 def test_a_log_of_a_folder_that_cannot_be_read_stops_no_other(kit: Path) -> None:

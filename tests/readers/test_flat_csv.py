@@ -233,7 +233,7 @@ def test_headings_are_wrapped_and_nothing_else(write: Write) -> None:
     assert log.values("ins", "true_heading_deg") == [350.0, 0.0, 912.0]  # no heading: left for the ledger
     assert log.values("gnss", "track_deg") == [0.0, 359.5, 10.0]
     assert log.values("ins", "roll_deg")[0] == -200.0 and log.values("gnss", "latitude_deg")[0] == 912.0
-    assert "1 values" in log.remarks["wrapped_heading"].text
+    assert "1 value " in log.remarks["wrapped_heading"].text
 
 
 def test_velocities_are_derived_from_track_and_speed(write: Write) -> None:
