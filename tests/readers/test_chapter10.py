@@ -255,7 +255,7 @@ def test_tmats_that_is_missing_contradicts_the_packets_or_describes_frames(tmp_p
     packet[-1] ^= 1
     items = read(tmp_path, bytes(packet) + words)
     told = [item.text for item in items if isinstance(item, Remark) and item.code == "tmats_contradicted"]
-    assert told == ["channel 7 is 1553IN by TMATS and has 1 ARINC-429 packets: they are believed"]
+    assert told == ["channel 7 is 1553IN by TMATS and has 1 ARINC-429 packet: they are believed"]
     header = items[0]
     assert isinstance(header, LogHeader) and header.metadata["pcm.2"] == "F1=16"
     assert [item.loses_data for item in items if isinstance(item, Damage)] == [False]

@@ -171,7 +171,7 @@ def _oscillator(theta: FloatArray, step_s: float, lanes: FloatArray, k: int) -> 
 
 @in_place
 def _begin(thetas: FloatArray, start_gap_s: float, lanes: FloatArray) -> None:
-    """Write noise and the covariance before the first sample, and a transition that changes nothing."""
+    """Write noise, the first covariance, and a transition that changes nothing."""
     for at in range(P_00, P_55 + LANES):
         lanes[at] = 0.0
     for k in range(LANES):
@@ -263,7 +263,7 @@ def _measure(lanes: FloatArray, from_north: float, from_east: float) -> None:
 
 @in_place
 def _filter_column(measured: float, fresh: float, lanes: FloatArray, x: FloatArray, innovation: FloatArray) -> None:
-    """Carry the states of a column over a step, and correct them by its sample; leaves the innovations."""
+    """Carry states of a column over a step, correct by its sample, leave innovations."""
     for k in range(LANES):
         sway, rate = x[2 * LANES + k], x[3 * LANES + k]
         x0, x1 = x[k] * lanes[KEEP_GNSS + k], x[LANES + k] * lanes[KEEP_GNSS + k]
