@@ -5,9 +5,10 @@ Kept are places and times, 16 bytes a record, for each set of topics that are sa
 those of the times at which values were valid.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -143,16 +144,12 @@ def _surveyed(items: Iterable[Item], places: Places, limits: Thresholds) -> Surv
             header = item
     clock, parts = clock_of(ClockPass(header, tuple(new_logs), places, pieces, references), limits)
     clock = replace(clock, relations=references.relations(clock))
-    results, silences = _NO_TOPICS, _Silences()
+    found, silences = _NO_TOPICS, _Silences()
     if clock.has_times:
-        results = _ledgers(places, pieces, contents, clock, limits)
-        silences = _Silences.of(results.outlines, contents, clock, limits)
-        if silences.pauses:
-            results = _ledgers(places, pieces, contents, clock, limits, silences.pauses)
-            silences = silences.without_pauses(results.outlines, limits)
-    topics = results.topics
+        found, silences = _counted(partial(_times, places, pieces, clock), contents, clock, limits)
+    topics = found.topics
     remarks += doubtful_dates(header.reader, clock, topics, remarks)
-    clock = replace(clock, lateness_ns=results.lateness_ns)
+    clock = replace(clock, lateness_ns=found.lateness_ns)
     dropouts, timeline = (contents.dropouts(clock), contents.timeline(clock)) if clock.has_times else ((), None)
     against = contents.contradictions(clock, header.metadata) if clock.has_times else ()
     told = tuple(damages), tuple(remarks), limits, dropouts, timeline, against, parts
@@ -166,18 +163,18 @@ class _Silences(NamedTuple):
     pauses: tuple[Pause, ...] = ()
     stops: tuple[Pause, ...] = ()
 
-    @classmethod
-    def of(cls, outlines: Sequence[Outline], contents: Contents, clock: ClockModel, limits: Thresholds) -> "_Silences":
-        """Return the silences that topics show; stops only where there is no pause."""
-        pauses = pauses_of(outlines, contents.armings(clock), limits.gaps)
-        return cls(pauses, () if pauses else stops_of(outlines, limits.gaps))
 
-    def without_pauses(self, outlines: Sequence[Outline], limits: Thresholds) -> "_Silences":
-        """Return the silences with the stops beside pauses, by topics that know these."""
-        return _Silences(self.pauses, stops_of(outlines, limits.gaps))
+class _Times(NamedTuple):
+    """Corrected times of a topic in order, shape (n,), and the order of its records."""
+
+    topic: str
+    time_ns: Int64Array
+    backward_steps: int = 0
+    stray_rows: int = 0
+    lateness_ns: int = 0
 
 
-class _Ledgers(NamedTuple):
+class _Counted(NamedTuple):
     """Ledgers of topics by name, how late their records are, outlines of their times."""
 
     topics: tuple[TopicCounts, ...]
@@ -185,44 +182,60 @@ class _Ledgers(NamedTuple):
     outlines: tuple[Outline, ...]
 
 
-_NO_TOPICS = _Ledgers((), {}, ())
+_NO_TOPICS = _Counted((), {}, ())
 
 
-def _ledgers(
-    places: Places,
-    pieces: Mapping[str, Sequence[PieceOnDisk]],
+def _times(places: Places, pieces: Mapping[str, Sequence[PieceOnDisk]], clock: ClockModel) -> Iterator[_Times]:
+    """Yield the times of all topics; those that are sampled together share theirs."""
+    together: dict[tuple[int, ...], list[str]] = {}
+    for topic, several in pieces.items():
+        together.setdefault(tuple(kept.number for kept in several), []).append(topic)
+    for topics in together.values():
+        order = _order_of(places, pieces[topics[0]], clock)
+        for topic in topics:
+            yield _Times(topic, order.valid_ns, order.backward_steps, order.stray_rows, order.lateness_ns)
+
+
+def _counted(
+    times: Callable[[], Iterable[_Times]], contents: Contents, clock: ClockModel, limits: Thresholds
+) -> tuple[_Counted, _Silences]:
+    """Return the ledgers of all topics, and the silences of the log.
+
+    Where it has pauses the topics are counted again, by a rhythm that knows them.
+    """
+    found = _count(times(), contents, clock, limits)
+    pauses = pauses_of(found.outlines, contents.armings(clock), limits.gaps)
+    if pauses:
+        found = _count(times(), contents, clock, limits, pauses)
+    return found, _Silences(pauses, stops_of(found.outlines, limits.gaps))
+
+
+def _count(
+    times: Iterable[_Times],
     contents: Contents,
     clock: ClockModel,
     limits: Thresholds,
     pauses: tuple[Pause, ...] = (),
-) -> _Ledgers:
-    """Return the ledgers of all topics.
-
-    Topics that are sampled together share times and lateness.
-    """
-    together: dict[tuple[int, ...], list[str]] = {}
-    for topic, several in pieces.items():
-        together.setdefault(tuple(kept.number for kept in several), []).append(topic)
+) -> _Counted:
+    """Return the ledgers of all topics, in alphabetical order."""
     ledgers, lateness_ns, outlines = [], {}, []
-    for topics in together.values():
-        order = _order_of(places, pieces[topics[0]], clock)
-        for topic in topics:
-            rhythm = rhythm_of(topic, order.valid_ns, limits, pauses)
-            ledger = topic_ledger(
-                topic,
-                order.valid_ns,
-                backward_steps=order.backward_steps,
-                stray_rows=order.stray_rows,
-                fields=contents.fields(topic, clock),
-                sequences=contents.sequences(topic, clock),
-                increments_s=contents.increments_s(topic),
-                rhythm=rhythm,
-            )
-            ledgers.append(ledger)
-            lateness_ns[topic] = order.lateness_ns
-            outlines.append(outline_of(topic, order.valid_ns, rhythm, limits.gaps))
+    for topic, time_ns, backward_steps, stray_rows, late_ns in times:
+        rhythm = rhythm_of(topic, time_ns, limits, pauses)
+        ledger = topic_ledger(
+            topic,
+            time_ns,
+            backward_steps=backward_steps,
+            stray_rows=stray_rows,
+            fields=contents.fields(topic, clock),
+            sequences=contents.sequences(topic, clock),
+            increments_s=contents.increments_s(topic),
+            rhythm=rhythm,
+        )
+        ledgers.append(ledger)
+        lateness_ns[topic] = late_ns
+        outlines.append(outline_of(topic, time_ns, rhythm, limits.gaps))
     ledgers.sort(key=lambda ledger: ledger.topic)
-    return _Ledgers(tuple(ledgers), lateness_ns, tuple(one for one in outlines if one is not None))
+    return _Counted(tuple(ledgers), lateness_ns, tuple(one for one in outlines if one is not None))
 
 
 class Census:
@@ -247,31 +260,10 @@ class Census:
     def ledger(self, damages: Sequence[Damage] = ()) -> LedgerCounts:
         """Return the ledger of the file; device order and device clock are not in it."""
         clock, contents, limits = self._clock, self._contents, self._thresholds
-        counted = self._counted(())
-        silences = _Silences.of(counted.outlines, contents, clock, limits)
-        if silences.pauses:
-            counted = self._counted(silences.pauses)
-            silences = silences.without_pauses(counted.outlines, limits)
+        found, silences = _counted(self._sorted, contents, clock, limits)
         dropouts, timeline = contents.dropouts(clock), contents.timeline(clock)
-        return LedgerCounts(counted.topics, clock, tuple(damages), (), limits, dropouts, timeline, (), (), *silences)
+        return LedgerCounts(found.topics, clock, tuple(damages), (), limits, dropouts, timeline, (), (), *silences)
 
-    def _counted(self, pauses: tuple[Pause, ...]) -> _Ledgers:
-        contents, limits = self._contents, self._thresholds
-        ledgers, outlines = [], []
-        for topic, pieces in sorted(self._times.items()):
-            time_ns = np.sort(np.concatenate(pieces), kind="stable")
-            rhythm = rhythm_of(topic, time_ns, limits, pauses)
-            ledgers.append(
-                topic_ledger(
-                    topic,
-                    time_ns,
-                    backward_steps=0,
-                    stray_rows=0,
-                    fields=contents.fields(topic, self._clock),
-                    sequences=contents.sequences(topic, self._clock),
-                    increments_s=contents.increments_s(topic),
-                    rhythm=rhythm,
-                )
-            )
-            outlines.append(outline_of(topic, time_ns, rhythm, limits.gaps))
-        return _Ledgers(tuple(ledgers), {}, tuple(one for one in outlines if one is not None))
+    def _sorted(self) -> Iterator[_Times]:
+        for topic, pieces in self._times.items():
+            yield _Times(topic, np.sort(np.concatenate(pieces), kind="stable"))
