@@ -37,16 +37,14 @@ class SavedLayout:
         return hashlib.sha256(self.content).hexdigest()
 
 
-def saved_layout(path: Path | None) -> SavedLayout | None:
-    """Return the layout of a file; None without a file.
+def saved_layout(path: Path) -> SavedLayout:
+    """Return the layout of a file.
 
     Raises
     ------
     UsageError
         When it is no layout that this version's viewer saved.
     """
-    if path is None:
-        return None
     from groundstation.viewer.saved_layout import read_layout, roots_of
 
     return SavedLayout(path.name, zlib.compress(read_layout(path)), _kind_of(roots_of(path)))
@@ -71,8 +69,6 @@ def saved_layouts(paths: Iterable[Path]) -> tuple[SavedLayout, ...]:
     """
     found: dict[str, SavedLayout] = {}
     for one in map(saved_layout, paths):
-        if one is None:
-            continue
         if one.of in found:
             both = f"{found[one.of].name} and {one.name}, both of a {one.of}"
             raise UsageError("--layout", both, "one of a flight, one of a session, one of fleet.rrd")

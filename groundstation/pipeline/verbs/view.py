@@ -62,7 +62,7 @@ def look_at(
         raise UsageError(what, "no such file or folder")
     if is_address and layout is not None:
         raise UsageError("--layout", "the address of a catalog", "a recording, flight folder, MCAP or log")
-    saved = saved_layout(layout)
+    saved = None if layout is None else saved_layout(layout)
     if not web:
         require_display(os.environ)  # before anything is computed
     if is_address:
