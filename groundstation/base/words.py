@@ -17,6 +17,17 @@ def listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
+def capitalised(text: str) -> str:
+    """Return a text with a capital first letter, the others as they are.
+
+    Examples
+    --------
+    >>> capitalised("fit of the INS"), capitalised("")
+    ('Fit of the INS', '')
+    """
+    return text[:1].upper() + text[1:]
+
+
 def counted(number: float, noun: str, nouns: str = "") -> str:
     """Return a number with its noun, in the plural but for one.
 

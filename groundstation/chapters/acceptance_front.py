@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 
 from groundstation.base.timescales import utc_ns_to_iso
+from groundstation.base.words import capitalised
 from groundstation.chapters.parts import Cell, Front, Mark
 from groundstation.chapters.wording import ABSENT, clean, number, number_with_unit, percent, plural, significant
 from groundstation.results.acceptance import (
@@ -148,7 +149,7 @@ def _missing(found: Acceptance, one: Judgement) -> str:
     if one.decision != "not enough flights":
         return ""
     short = _short(found, one)
-    told = f"{short[:1].upper()}{short[1:]}"
+    told = capitalised(short)
     if not one.over:
         return f"{told}."
     at_share = (

@@ -6,6 +6,7 @@ Their sources, and the answers, settings and findings that differ.
 from collections.abc import Sequence
 
 from groundstation.base.findings import Finding
+from groundstation.base.words import capitalised
 from groundstation.chapters.findings import MARKS
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Part, Section
 from groundstation.chapters.wording import ABSENT, any_value, named_quantity, number, significant, words
@@ -81,7 +82,7 @@ def subject(name: str) -> str:
     ('INS ground', 'Magnetic ground', 'GNSS')
     """
     told = " ".join(word.upper() if word in ("ins", "gnss") else word for word in words(name).split())
-    return f"{told[:1].upper()}{told[1:]}"
+    return capitalised(told)
 
 
 def opening(comparison: Comparison) -> list[Part]:

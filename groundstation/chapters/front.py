@@ -9,6 +9,7 @@ from dataclasses import replace
 from groundstation.base.failures import attempt
 from groundstation.base.findings import worst
 from groundstation.base.timescales import utc_ns_to_iso
+from groundstation.base.words import capitalised
 from groundstation.chapters.assessed import not_assessed
 from groundstation.chapters.by_answer import answer_chapters, loss_above
 from groundstation.chapters.chapter import Chapter, Chapters, Pairs
@@ -94,7 +95,7 @@ def _front(results: FlightResults, chapters: Chapters, answers: Sequence[Section
 
 def _told(line: str) -> str:
     """Return a line with a capital and the signs of a page."""
-    return typeset(f"{line[:1].upper()}{line[1:]}")
+    return typeset(capitalised(line))
 
 
 def _pairs(results: FlightResults) -> tuple[tuple[str, Cell], ...]:

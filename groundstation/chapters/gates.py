@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 
+from groundstation.base.words import capitalised
 from groundstation.chapters.parts import Cell, Facts, Grid, Head, Mark
 from groundstation.chapters.wording import clean, number_with_unit, significant, typeset, unit_sign
 from groundstation.results.gates import Gate
@@ -34,7 +35,7 @@ def gate_grid(gates: Sequence[Gate]) -> Grid | None:
 def _row(gate: Gate) -> tuple[Cell, ...]:
     value = number_with_unit(significant(gate.value, 3), unit_sign(gate.unit))
     title = gate.title or gate.name
-    title = title[:1].upper() + title[1:]
+    title = capitalised(title)
     reason = "" if gate.state == "passed" else typeset(gate.reason)
     note = "; ".join(filter(None, ("" if gate.required else INFORMS, reason)))
     return state_of(gate), title, value, limit_text(gate), note

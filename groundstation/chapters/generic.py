@@ -13,6 +13,7 @@ from typing import Any, cast
 import numpy as np
 
 from groundstation.base.digits import digits_of, rounded
+from groundstation.base.words import capitalised
 from groundstation.chapters.gates import gate_grid, setting_facts
 from groundstation.chapters.parts import (
     Cell,
@@ -131,7 +132,7 @@ def titled(text: str) -> str:
     ('GNSS noise', 'Speed RMS')
     """
     told = " ".join(ACRONYMS.get(word, word) for word in text.split(" "))
-    return told[:1].upper() + told[1:]
+    return capitalised(told)
 
 
 def _fields(holder: Any) -> list[tuple[str, Any]]:

@@ -7,7 +7,7 @@ them stands here. A signal that the log has is not asked for.
 from collections.abc import Iterator
 
 from groundstation.base.signals import topics_of_kind
-from groundstation.base.words import listed
+from groundstation.base.words import capitalised, listed
 from groundstation.chapters.chapter import Advice, Chapters, Remedies
 from groundstation.chapters.held_signals import without_held
 from groundstation.chapters.parts import Facts, Section
@@ -60,7 +60,7 @@ def _told(texts: dict[str, list[str]]) -> str:
     for text, purposes in texts.items():
         groups.setdefault("" if "" in purposes else listed([f"the {one}" for one in purposes]), []).append(text)
     told = "; ".join(f"for {who}: {', '.join(some)}" if who else ", ".join(some) for who, some in groups.items())
-    return f"{told[:1].upper()}{told[1:]}."
+    return f"{capitalised(told)}."
 
 
 def _advice(results: FlightResults, chapters: Chapters) -> Iterator[Advice]:

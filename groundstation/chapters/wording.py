@@ -8,7 +8,7 @@ from typing import Any, TypeGuard
 from groundstation.base.printable import printable
 from groundstation.base.unit_names import UNITS, split_unit
 from groundstation.base.units import M_PER_FOOT
-from groundstation.base.words import clock_text
+from groundstation.base.words import capitalised, clock_text
 
 ABSENT = "—"
 MINUS = "−"
@@ -157,7 +157,7 @@ def sentence(text: str) -> str:
     ('Coverage: 0.9, at least 0.98.', 'Fit −1.2°.')
     """
     told = typeset(text).strip().rstrip(".")
-    return f"{told[:1].upper()}{told[1:]}."
+    return f"{capitalised(told)}."
 
 
 def with_full_stop(text: str) -> str:
@@ -169,7 +169,7 @@ def with_full_stop(text: str) -> str:
     ('Every required gate passed.', 'Why?')
     """
     text = text.strip()
-    return text[:1].upper() + text[1:] + ("" if not text or text[-1] in ".!?" else ".")
+    return capitalised(text) + ("" if not text or text[-1] in ".!?" else ".")
 
 
 def words(name: str) -> str:

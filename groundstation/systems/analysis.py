@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar, cast
 
 from groundstation.base.findings import Finding
+from groundstation.base.words import capitalised
 from groundstation.results.answer import Answer, Answers
 from groundstation.results.columns import AnswerColumn
 from groundstation.results.rules import Rejudged
@@ -218,7 +219,7 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     @property
     def title_of_pages(self) -> str:
         """Title of pages, with a capital."""
-        return self.page_title or f"{self.subject[:1].upper()}{self.subject[1:]}"
+        return self.page_title or capitalised(self.subject)
 
     def values(self, answers: Answers) -> dict[str, Any]:
         """Values of its columns in the tables of flights, by name; none without an answer."""

@@ -6,6 +6,7 @@ from typing import Final
 
 import rerun.blueprint as rrb
 
+from groundstation.base.words import capitalised
 from groundstation.chapters.fleet.common import title_of
 from groundstation.chapters.fleet.trend import QUANTITIES
 from groundstation.chapters.plots.fleet.trend import HEADING, POSITIVE, chart
@@ -85,7 +86,7 @@ def _alone(told: Panel) -> Panel:
 
 def _title(quantity: str) -> str:
     title, unit = title_of(quantity), QUANTITIES[quantity].rpartition(", ")[2]
-    return f"{title[:1].upper()}{title[1:]}, {unit}"
+    return f"{capitalised(title)}, {unit}"
 
 
 def by_aircraft(having: Sequence[ChartedAircraft], quantity: str) -> list[rrb.View]:

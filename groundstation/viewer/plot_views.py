@@ -12,6 +12,7 @@ from itertools import groupby
 import numpy as np
 import rerun.blueprint as rrb
 
+from groundstation.base.words import capitalised
 from groundstation.plots import extents
 from groundstation.plots.marks import Band, Curve, Dots, Lanes, Limit, Mark, Points, Spans
 from groundstation.plots.plot import Panel, Plot
@@ -118,7 +119,7 @@ def _named(told: Plot | None, of: str) -> Iterator[tuple[str, str, Panel]]:
             found.append((panel, ": ".join(filter(None, (of, own, axis))) or told.title))
     parts = path_parts(_part(panel, title) for panel, title in found)
     for (panel, title), part in zip(found, parts, strict=True):
-        yield f"{base}/{part}", clean_text(title[:1].upper() + title[1:]), panel
+        yield f"{base}/{part}", clean_text(capitalised(title)), panel
 
 
 def _part(panel: Panel, title: str) -> str:

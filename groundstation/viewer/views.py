@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import rerun as rr
 import rerun.blueprint as rrb
 
+from groundstation.base.words import capitalised
 from groundstation.viewer import colours
 from groundstation.viewer.recorder import Line
 
@@ -61,7 +62,7 @@ def told_by_colour(lines: Sequence[Line], unit: str) -> str:
     """
     names = [f"{line.name} ({colours.WORDS[line.colour]})" if len(lines) > 1 else line.name for line in lines]
     told = ", ".join([*names, unit])
-    return told[:1].upper() + told[1:]
+    return capitalised(told)
 
 
 def document(name: str, path: str) -> rrb.TextDocumentView:

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+from groundstation.base.words import capitalised
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, Tone, kept
 from groundstation.chapters.wording import clock, number, typeset, with_full_stop
@@ -103,7 +104,7 @@ def _same_claims(answer: GnssReception) -> list[str]:
 def _headline(answer: GnssReception) -> str:
     """Return the sentence, behind what is against the reception, with a capital."""
     told = answer.line
-    return typeset(f"{told[:1].upper()}{told[1:]}")
+    return typeset(capitalised(told))
 
 
 def _states(answer: GnssReception) -> Grid:
@@ -215,7 +216,7 @@ def _standstill(one: GnssReceiver, answer: GnssReception) -> list[Part | None]:
         for stood in every
     ]
     told = [f"{name_of(stood.state)}: {memory_of(stood)}" if len(every) > 1 else memory_of(stood) for stood in every]
-    caption = " ".join(with_full_stop(f"{text[:1].upper()}{text[1:]}") for text in (*told, *_edges(one, every, answer)))
+    caption = " ".join(with_full_stop(capitalised(text)) for text in (*told, *_edges(one, every, answer)))
     return [
         Grid(f"Scatter at standstill by kind of fix{_of(one, answer)}", heads, rows, caption, ("gnss_standstill",)),
         Figure("gnss.standstill", of=one.topic),
@@ -272,7 +273,7 @@ def _motion(one: GnssReceiver, answer: GnssReception) -> list[Part | None]:
         )
     too_sure = float(answer.settings.get("too_sure", 2.0))
     meaning = meaning_of(motion, too_sure)
-    text = with_full_stop(f"{meaning[:1].upper()}{meaning[1:]}")
+    text = with_full_stop(capitalised(meaning))
     return [Facts(f"Velocity against position{_of(one, answer)}", pairs, text), Figure("gnss.steps", of=one.topic)]
 
 

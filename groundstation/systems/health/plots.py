@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from groundstation.base.words import capitalised
 from groundstation.chapters.plots.common import label, span
 from groundstation.chapters.wording import unit_sign
 from groundstation.plots.axes import broken_time_axis, time_axis
@@ -68,7 +69,7 @@ def panels(results: FlightResults, key: str) -> Plot | None:
     )
     return Plot(
         f"health.panels.{key}",
-        check.title[:1].upper() + check.title[1:],
+        capitalised(check.title),
         "The worst value of each short span; broken lines: amber and red limits.",
         f"{check.title} over flight time.",
         rows,
@@ -135,7 +136,7 @@ def _panels(answer: AutopilotHealth, check: Check, data: HealthSeries) -> Iterat
         if marks:
             shown = data.value[np.isin(data.measure, [places[id(one)] for one in own])]
             limits = list(_limits(own[0], shown))
-            title = own[0].title[:1].upper() + own[0].title[1:]
+            title = capitalised(own[0].title)
             yield title, _upright(shown, limits, sign_of(own[0].unit)), [*marks, *limits]
 
 

@@ -6,7 +6,7 @@ GNSS good, filter healthy, vibration high 12:03-12:39.
 import re
 from collections.abc import Mapping, Sequence
 
-from groundstation.base.words import clock_text, listed, tenths_text
+from groundstation.base.words import capitalised, clock_text, listed, tenths_text
 from groundstation.systems.health.answer import FIRST, IN_TENTHS_S, LOST, AttitudeLoss, Check, gravity, span_words
 
 MOST_BAD = 4
@@ -86,7 +86,7 @@ def told(checks: Sequence[Check], loss: AttitudeLoss | None = None) -> str:
     if len(bad) > MOST_BAD:
         parts.append(f"and {len(bad) - MOST_BAD} more")
     shown = "; ".join(", ".join(filter(None, group)) for group in (parts, _of_the_first(checks)) if any(group))
-    return _capital(shown)
+    return capitalised(shown)
 
 
 def told_apart(checks: Sequence[Check], loss: AttitudeLoss | None = None) -> tuple[str, tuple[str, ...]]:
@@ -106,7 +106,7 @@ def told_apart(checks: Sequence[Check], loss: AttitudeLoss | None = None) -> tup
     lasting = [_part(one) for one in failed if one not in timed][:1]
     head = [part for part in (*lasting, *first) if part] or parts[:1]
     rest = [part for part in parts if part not in head] + ([good] if good and head else [])
-    return _capital("; ".join(head) or good), tuple(map(_capital, rest))
+    return capitalised("; ".join(head) or good), tuple(map(capitalised, rest))
 
 
 def _of_the_first(checks: Sequence[Check]) -> list[str]:
@@ -116,10 +116,6 @@ def _of_the_first(checks: Sequence[Check]) -> list[str]:
     absent = [NAMES[one.key] for one in first if one.verdict == "not_logged"]
     good = [_part(one) for one in first if one.verdict == "pass"]
     return [*filter(None, good), *([f"{listed(absent)} not logged"] if absent else [])]
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def _by_time(bad: Sequence[Check], loss: AttitudeLoss | None) -> list[str]:

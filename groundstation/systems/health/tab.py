@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import rerun.blueprint as rrb
 
+from groundstation.base.words import capitalised
 from groundstation.chapters.markdown import markdown
 from groundstation.results.flight import FlightResults
 from groundstation.systems.health.answer import AutopilotHealth, Verdict
@@ -35,7 +36,7 @@ def health(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     ]  # seconds around the loss: in a view of the whole flight they are a sliver
     for one in sorted(answer.checks, key=lambda check: ORDER.index(check.verdict)):
         told = plot_of(recorder, "health.panels", results, one.key)
-        title = one.title[:1].upper() + one.title[1:]
+        title = capitalised(one.title)
         views = panels_of(recorder, told, of=title if told is not None and len(told.panels) == 1 else "")
         checks += views if len(views) == 1 else [rrb.Vertical(contents=views, name=title)] if views else []
     if checks:

@@ -3,6 +3,7 @@
 INS - GNSS, the innovations that its own filter logged, and its errors where an answer with its own states knows them.
 """
 
+from groundstation.base.words import capitalised
 from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, kept
 from groundstation.chapters.wording import ABSENT, any_value, clock, number, percent, significant, typeset, unit_sign
 from groundstation.results.answer import Answers
@@ -46,7 +47,7 @@ def _claim(answer: InertialResult, headline: str, judged: JudgedFilter | None) -
         for row in rows
     )
     reason = typeset(answer.kind_reason).strip().rstrip(".")
-    sentences = (f"{reason[:1].upper()}{reason[1:]}.",) if reason else ()
+    sentences = (f"{capitalised(reason)}.",) if reason else ()
     value = figures[0][1] if figures else ""
     unseen = "its own drift cannot be seen" if judged is None else f"its errors are judged {judged.by}"
     remark = f"INS − GNSS, 95 %; {unseen}" if figures else unseen
@@ -137,7 +138,7 @@ def _errors(judged: JudgedFilter | None) -> Note | None:
         return None
     constant = f" Constant, and no error of the filter: {'; '.join(judged.constants)}." if judged.constants else ""
     wrong = f"Worst: {judged.wrong}. " if judged.worst else ""
-    wrong += "".join(f"{one[:1].upper()}{one[1:]}. " for one in judged.changes)
+    wrong += "".join(f"{capitalised(one)}. " for one in judged.changes)
     along = "The chapter of what judges it has them along the flight."
     text = f"{wrong}Errors of the INS, judged {judged.by}: {judged.errors}.{constant} {along}"
     return Note(typeset(text), "good" if judged.worst is None and not judged.changes else "warn")

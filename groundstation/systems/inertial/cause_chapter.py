@@ -1,5 +1,6 @@
 """Chapter on the errors of an unaided INS by cause: shares, Schuler, body axes, legs."""
 
+from groundstation.base.words import capitalised
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Cell, Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, kept
 from groundstation.chapters.wording import ABSENT, clock, number, typeset, unit_sign
@@ -175,7 +176,7 @@ def _parameters(answer: CausesResult) -> Grid:
 def _parameter_row(one: CauseParameter) -> tuple[Cell, ...]:
     places = PLACES.get(one.unit, 3)
     return (
-        f"{one.title[:1].upper()}{one.title[1:]}, {SIGNS.get(one.unit) or unit_sign(one.unit)}",
+        f"{capitalised(one.title)}, {SIGNS.get(one.unit) or unit_sign(one.unit)}",
         number(one.value, places, signed=True),
         number(one.half95, places),
         number(one.observability, 2),

@@ -6,6 +6,7 @@ The quality of the INS, the error states with sigma, and the consistency of the 
 from collections.abc import Mapping
 from dataclasses import replace
 
+from groundstation.base.words import capitalised
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.gates import setting_facts
 from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Mark, Note, Part, Section, Tone, kept
@@ -228,7 +229,7 @@ def _state_row(answer: InertialResult, states: list[StateEstimate | None]) -> tu
     """Return one state of both channels, None in a channel that lacks it."""
     known = next(state for state in states if state is not None)
     title = known.title or known.name
-    title = f"{title[:1].upper()}{title[1:]}, {unit_sign(known.unit)}"
+    title = f"{capitalised(title)}, {unit_sign(known.unit)}"
     is_alone = [
         state is not None and is_left_alone(state.name, state.sigma, state.observability, answer.settings)
         for state in states

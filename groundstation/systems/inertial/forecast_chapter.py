@@ -5,6 +5,7 @@ How good it is by method and horizon, and whether its sigma is honest.
 
 from collections.abc import Iterable
 
+from groundstation.base.words import capitalised
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Cell, Figure, Grid, Head, Mark, Part, Section, Tone, kept
 from groundstation.chapters.wording import clock, is_number, number, percent, words
@@ -131,7 +132,7 @@ def _calibration(answer: ForecastResult) -> list[Grid]:
     for name in dict.fromkeys((answer.default_method, *COMPARED)):
         rows = [_calibration_cells(row) for row in answer.calibration if row.method == name]
         if rows:
-            title = f"Is the claimed σ honest? {short(name)[:1].upper()}{short(name)[1:]}"
+            title = f"Is the claimed σ honest? {capitalised(short(name))}"
             grids.append(Grid(title, heads, rows, "" if grids else caption))
     return grids
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from groundstation.base.words import listed
+from groundstation.base.words import capitalised, listed
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Cell, Claim, Figure, Grid, Head, Mark, Note, Part, Rank, Section, kept
 from groundstation.chapters.wording import ABSENT, clock, number, percent, typeset
@@ -181,7 +181,7 @@ def _pair_rate(pair: InsPair) -> Cell:
 def _pair_state(pair: InsPair) -> Cell:
     if pair.why_not:
         is_name = pair.why_not.startswith((pair.first, pair.second))
-        return Mark("unknown", pair.why_not if is_name else pair.why_not[:1].upper() + pair.why_not[1:])
+        return Mark("unknown", pair.why_not if is_name else capitalised(pair.why_not))
     return Mark("warn", "Beyond") if pair.is_beyond else Mark("good", "Within")
 
 

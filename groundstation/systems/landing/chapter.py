@@ -4,6 +4,7 @@ How each was flown, where it touched down, and what shows accuracy.
 """
 
 from groundstation.base.units import DOTS_PER_FULL_SCALE
+from groundstation.base.words import capitalised
 from groundstation.chapters.chapter import Remedies
 from groundstation.chapters.gates import setting_facts
 from groundstation.chapters.parts import (
@@ -101,7 +102,7 @@ def _claim(answer: LandingResult) -> Claim | None:
     return Claim(
         Rank.LANDING_OPEN if state.text == NOT_MEASURED else Rank.LANDING,
         Mark(state.tone, state.text.capitalize()),
-        f"{_name(one)[:1].upper()}{_name(one)[1:]}",
+        capitalised(_name(one)),
         value=state.text.capitalize(),
         remark=_name(one),
         sentences=(f"{_why(one)}{also}",),

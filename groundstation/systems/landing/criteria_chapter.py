@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import M_PER_FOOT, M_PER_NAUTICAL_MILE
+from groundstation.base.words import capitalised
 from groundstation.chapters.gates import limit_text, state_of
 from groundstation.chapters.parts import Cell, Facts, Grid, Head, Mark, Note, Part, Tone
 from groundstation.chapters.wording import (
@@ -63,7 +64,7 @@ def _check(one: Approach, at: StabilisedAt, floor_m: float | str | bool | None) 
         rows.append(
             (
                 GATE_STATES.get(gate.state) or state_of(gate),
-                gate.title[:1].upper() + gate.title[1:],
+                capitalised(gate.title),
                 _value_of(gate, sides.get(gate.name, "")),
                 _limit_of(gate),
                 _where(places.get(gate.name)),
@@ -117,7 +118,7 @@ def _rest(one: Approach) -> Grid | None:
     rows: list[tuple[Cell, ...]] = [
         (
             Mark(TONES[criterion.state], criterion.state),
-            criterion.kind.title[:1].upper() + criterion.kind.title[1:],
+            capitalised(criterion.kind.title),
             value_text(criterion),
             limits_text(criterion),
             _place_of(criterion),

@@ -3,6 +3,7 @@
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
+from groundstation.base.words import capitalised
 from groundstation.chapters.parts import Cell, Facts, Grid, Head, Mark, Part, Tone
 from groundstation.chapters.wording import ABSENT, clock, number, sentence, typeset, with_feet
 from groundstation.systems.landing.answer import Approach
@@ -132,7 +133,7 @@ def _witnesses(one: Approach, down: Touchdown) -> Grid | None:
 def _row(witness: Witness, down: Touchdown) -> tuple[Cell, ...]:
     tone, text = STATES[witness.state]
     off_s = None if witness.time_s is None else witness.time_s - down.time_s
-    name = witness.name[:1].upper() + witness.name[1:]
+    name = capitalised(witness.name)
     return (
         f"{name}, {typeset(witness.topic)}" if witness.topic else name,
         Mark(tone, text),

@@ -3,6 +3,7 @@
 Errors of GNSS, INS and the answers; claimed sigma against seen errors.
 """
 
+from groundstation.base.words import capitalised
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.gates import setting_facts
 from groundstation.chapters.parts import Cell, Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, kept
@@ -81,7 +82,7 @@ def _claim(answer: ReferenceResult) -> Claim:
     judged = [row for row in answer.claims if row.state in ("too_sure", "too_careful", "consistent")]
     mark = Mark("warn", "Too sure") if sure else Mark("good", "Consistent") if judged else Mark("good", "Measured")
     sentences = [
-        f"{name[:1].upper()}{name[1:]}: {percent(row.share_inside95)} of the errors inside the 95 % claimed."
+        f"{capitalised(name)}: {percent(row.share_inside95)} of the errors inside the 95 % claimed."
         for row in sure[:2]
         if (name := _name(row))
     ]

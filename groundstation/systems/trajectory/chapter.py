@@ -1,7 +1,6 @@
 """Chapter on the best trajectory: doubt first, then the on-board filter and the accuracy."""
 
-from groundstation.base.quantiles import NORMAL_95
-from groundstation.base.words import places_of, with_half
+from groundstation.base.words import capitalised, with_half
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.gates import gate_grid
 from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Mark, Note, Part, Section, kept
@@ -9,13 +8,12 @@ from groundstation.chapters.wording import (
     ABSENT,
     clock,
     number,
-    number_with_unit,
     percent,
     significant,
     typeset,
 )
 from groundstation.results.flight import FlightResults
-from groundstation.systems.trajectory.answer import TRAVEL, BestTrajectory, TrajectoryParameter, UnitMounting
+from groundstation.systems.trajectory.answer import BestTrajectory, UnitMounting
 from groundstation.systems.trajectory.checks_answer import InnovationRow
 from groundstation.systems.trajectory.claim_chapter import (
     axes_texts,
@@ -26,6 +24,13 @@ from groundstation.systems.trajectory.claim_chapter import (
     wrong_texts,
 )
 from groundstation.systems.trajectory.onboard_answer import OnboardError, OnboardErrors
+from groundstation.systems.trajectory.parameters_chapter import (
+    noise,
+    parameters,
+    raised,
+    separation,
+    with_unit,
+)
 from groundstation.systems.trajectory.quantity_answer import SURE_DEG, UNITS, Quantity
 from groundstation.systems.trajectory.wording_answer import (
     sentence_of,
@@ -65,19 +70,19 @@ def trajectory(results: FlightResults) -> Section | None:
         _checks(answer),
         _residuals(answer),
         _aids(answer),
-        _parameters(answer),
+        parameters(answer),
     ]
     appendix: list[Part | None] = [
         _basis(answer),
         gate_grid(answer.gates),
         Figure("trajectory.sigmas"),
         Figure("trajectory.separation"),
-        _separation(answer),
+        separation(answer),
         Figure("trajectory.residuals"),
         Figure("trajectory.biases"),
         Figure("trajectory.attitude"),
-        _noise(answer),
-        _raised(answer),
+        noise(answer),
+        raised(answer),
     ]
     headline = typeset(sentence_of(answer))
     return Section("trajectory", TITLE, LEAD, kept(parts), headline, claim=claim_of(answer), appendix=kept(appendix))
@@ -136,10 +141,10 @@ def _told_of_filter(answer: BestTrajectory) -> list[Note]:
 def _accuracy(answer: BestTrajectory) -> Grid | None:
     rows = [
         (
-            _capital(one.quantity),
-            _with(one.median_within95, one.unit),
-            _with(one.median_sigma, one.unit),
-            _with(one.worst_sigma, one.unit),
+            capitalised(one.quantity),
+            with_unit(one.median_within95, one.unit),
+            with_unit(one.median_sigma, one.unit),
+            with_unit(one.worst_sigma, one.unit),
             clock(one.worst_s),
         )
         for one in answer.accuracy
@@ -202,7 +207,11 @@ def _every_filter(answer: BestTrajectory) -> Grid | None:
     )
     every = (answer.onboard, *answer.other_filters)
     known = [one for one in quantities if any(each.row(one) is not None for each in every)]
-    heads = (Head("Filter"), Head("Flew the vehicle"), *(Head(f"{_capital(one)}, {_unit(one)}", True) for one in known))
+    heads = (
+        Head("Filter"),
+        Head("Flew the vehicle"),
+        *(Head(f"{capitalised(one)}, {_unit(one)}", True) for one in known),
+    )
     heads = (*heads, Head("Wrong beyond 95 %"))
     rows = [
         (
@@ -245,7 +254,14 @@ def _onboard_row(answer: BestTrajectory, row: OnboardError, *, is_sure: bool) ->
         wrong = Mark("warn", typeset(text))
     words = typeset(row.offset_words) if row.offset_cause else ""
     cause = f"{row.offset_cause}: {words}" if words and not words.startswith(row.offset_cause) else words
-    return _capital(row.quantity), constant, cause, _with(row.rms, row.unit), _with(row.sigma_rms, row.unit), wrong
+    return (
+        capitalised(row.quantity),
+        constant,
+        cause,
+        with_unit(row.rms, row.unit),
+        with_unit(row.sigma_rms, row.unit),
+        wrong,
+    )
 
 
 def _outages(answer: BestTrajectory) -> Grid | None:
@@ -264,7 +280,7 @@ def _outages(answer: BestTrajectory) -> Grid | None:
             _rms_and_worst(one.forward_end_rms_m, one.forward_end_worst_m),
             percent(one.inside95_share),
             number(one.rms_over_sigma, 2),
-            _with(one.vertical_rms_m, "m"),
+            with_unit(one.vertical_rms_m, "m"),
             ABSENT if one.vertical_inside95_share is None else percent(one.vertical_inside95_share),
         )
         for one in answer.outages
@@ -293,8 +309,8 @@ def _left_out(answer: BestTrajectory) -> str:
 
 
 def _rms_and_worst(rms_m: float | None, worst_m: float | None) -> str:
-    worst = "" if worst_m is None else f", worst {_with(worst_m, 'm')}"
-    return f"{_with(rms_m, 'm')}{worst}"
+    worst = "" if worst_m is None else f", worst {with_unit(worst_m, 'm')}"
+    return f"{with_unit(rms_m, 'm')}{worst}"
 
 
 def _checks(answer: BestTrajectory) -> Grid | None:
@@ -316,7 +332,7 @@ def _aids(answer: BestTrajectory) -> Grid | None:
         return None
     rows: list[tuple[Cell, ...]] = [
         (
-            _capital(one.name),
+            capitalised(one.name),
             one.topic or ABSENT,
             Mark("good", "yes") if one.is_used else Mark("warn" if one.is_wrong else "unknown", "no"),
             typeset(one.reason),
@@ -341,11 +357,11 @@ def _residuals(answer: BestTrajectory) -> Grid | None:
     )
     rows: list[tuple[Cell, ...]] = [
         (
-            _capital(one.quantity),
-            _with(one.used_rms, one.unit),
+            capitalised(one.quantity),
+            with_unit(one.used_rms, one.unit),
             number(one.used_count, 0),
-            _with(one.error_rms, one.unit),
-            _with(one.sigma_rms, one.unit),
+            with_unit(one.error_rms, one.unit),
+            with_unit(one.sigma_rms, one.unit),
             number(one.count, 0),
             percent(one.inside95_share),
         )
@@ -353,69 +369,6 @@ def _residuals(answer: BestTrajectory) -> Grid | None:
     ]
     caption = "Held out: ten seconds of every hundred, against a solution without them. n: values, each axis by itself."
     return Grid("GNSS used and held out", heads, rows, caption, ("trajectory_residuals",)) if rows else None
-
-
-def _parameters(answer: BestTrajectory) -> Grid | None:
-    if not answer.parameters:
-        return None
-    heads = (
-        *(Head("Parameter"), Head("Value, ± 95 %", True), Head("Assumed at first, 95 %", True)),
-        Head("Observable"),
-    )
-    caption = "Values at the end of the log, in the axes of the body."
-    if any(not one.is_observable and not one.is_far for one in answer.parameters):
-        caption += " Not observable: the log hardly narrows what was assumed, and no value is told."
-    if any(one.is_far for one in answer.parameters):
-        caption += (
-            " Not by itself: the log asks for more than was assumed and hardly narrows it. It shows a sum with others, "
-            "such as scale and bias of one axis: do not use the value alone."
-        )
-    if any(one.name in TRAVEL for one in answer.parameters):
-        caption += " Travel in the unit: direction in which the vehicle goes straight on, right and up of the unit."
-    return Grid("Parameters found", heads, [_parameter(one) for one in answer.parameters], caption)
-
-
-def _parameter(row: TrajectoryParameter) -> tuple[Cell, ...]:
-    mark = Mark("good", "yes") if row.is_observable else Mark("unknown", "no")
-    mark = Mark("warn", "not by itself") if row.is_far else mark
-    is_told = row.is_observable or row.is_far
-    value = _signed(row.value, NORMAL_95 * row.sigma, row.unit) if is_told else ABSENT
-    return _capital(row.name), value, f"± {_with(NORMAL_95 * row.start_sigma, row.unit)}", mark
-
-
-def _noise(answer: BestTrajectory) -> Grid | None:
-    if not answer.noise:
-        return None
-    heads = (Head("Noise"), Head("Of its class", True), Head("Fitted", True), Head("Bound"))
-    rows: list[tuple[Cell, ...]] = [
-        (
-            _capital(one.name),
-            _with(one.prior, one.unit, 3),
-            _with(one.fitted, one.unit, 3),
-            Mark("warn", "at its bound") if one.is_at_bound else "",
-        )
-        for one in answer.noise
-    ]
-    return Grid("Noise of the model", heads, rows, "Fitted to this log by likelihood, within the bounds of the class.")
-
-
-def _raised(answer: BestTrajectory) -> Grid | None:
-    if not answer.raised:
-        return None
-    heads = (Head("Sigma"), Head("Raised by", True), Head("Why"))
-    rows = [(_capital(one.name), number(one.factor, 2), typeset(one.reason)) for one in answer.raised]
-    return Grid("Sigmas raised", heads, rows, "They are never lowered.")
-
-
-def _separation(answer: BestTrajectory) -> Grid | None:
-    if not answer.separation:
-        return None
-    heads = (Head("Quantity"), Head("RMS", True), Head("Worst", True), Head("At", True))
-    rows = [
-        (_capital(one.quantity), _with(one.rms, one.unit), _with(one.worst, one.unit), clock(one.worst_s))
-        for one in answer.separation
-    ]
-    return Grid("Forward filter against smoothed solution", heads, rows, "", ("trajectory_separation",))
 
 
 def _basis(answer: BestTrajectory) -> Facts:
@@ -441,19 +394,3 @@ def _mounting(mounting: UnitMounting) -> str:
     )
     sigma = "" if mounting.sigma_deg is None else f" (σ {number(mounting.sigma_deg, 1, '°')})"
     return f"{angles}{sigma}{'; ' * bool(mounting.words)}{typeset(mounting.words)}"
-
-
-# ---------------------------------------------------------------------------------------------------------- words
-
-
-def _with(value: float | None, unit: str, digits: int = 2) -> str:
-    return number_with_unit(significant(value, digits), unit_sign_of(unit))
-
-
-def _signed(value: float, half: float, unit: str) -> str:
-    places = places_of(half)
-    return number_with_unit(f"{number(value, places)} ± {number(half, places)}", unit_sign_of(unit))
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from groundstation.base.words import with_half
+from groundstation.base.words import capitalised, with_half
 from groundstation.chapters.parts import Claim, Mark, Rank
 from groundstation.chapters.wording import number_with_unit, significant, typeset, with_full_stop
 from groundstation.systems.trajectory.answer import BestTrajectory, TrajectoryState
@@ -150,7 +150,7 @@ def full_sentence(text: str) -> str:
 
 def _headline(text: str) -> str:
     told = typeset(text)
-    return told[:1].upper() + told[1:]
+    return capitalised(told)
 
 
 def unit_sign_of(unit: str) -> str:
