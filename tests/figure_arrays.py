@@ -2,6 +2,7 @@
 
 import importlib
 import pkgutil
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -20,12 +21,18 @@ FILLERS: dict[type, Any] = {
 }
 
 
-def kinds() -> dict[str, type[Arrays]]:
-    """Every class of arrays by the name of its figure."""
+@cache
+def _load_all() -> None:
+    """Import every module that has arrays."""
     for room in (shared, systems):
         for module in pkgutil.walk_packages(room.__path__, f"{room.__name__}."):
             if room is shared or module.name.endswith("arrays"):
                 importlib.import_module(module.name)
+
+
+def kinds() -> dict[str, type[Arrays]]:
+    """Every class of arrays by the name of its figure."""
+    _load_all()
     return {kind.figure: kind for kind in Arrays.__subclasses__() if kind.__module__.startswith("groundstation.")}
 
 

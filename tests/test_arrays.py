@@ -59,7 +59,8 @@ def asked_by_text() -> Iterator[tuple[str, int]]:
         name = path.relative_to(PACKAGE).as_posix()
         if name.startswith(("readers/", "base/")):
             continue  # functions of their own under these names
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        text = path.read_text(encoding="utf-8")
+        for node in ast.walk(ast.parse(text)) if any(called in text for called in BY_TEXT) else ():
             if isinstance(node, ast.Call) and node.args:
                 called = node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
                 is_own = isinstance(node.func, ast.Attribute) and called != "figure_with_rows"

@@ -45,7 +45,8 @@ def asked_in_code() -> dict[str, str]:
     """Texts under "Record", of remedies, advice and gates, with their file."""
     found = {}
     for path in (*(PACKAGE / "systems").rglob("*.py"), *(PACKAGE / "chapters").rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        text = path.read_text(encoding="utf-8")
+        for node in ast.walk(ast.parse(text)) if '"Record"' in text else ():
             parts: list[ast.expr] = []
             if isinstance(node, ast.Tuple) and len(node.elts) == 2:
                 parts = node.elts
