@@ -17,7 +17,7 @@ from groundstation.chapters.grades import legend
 from groundstation.chapters.parts import Cell, Facts, Front, Mark, Note, Section, Tile
 from groundstation.chapters.wording import ABSENT, clean, clock, is_number, typeset
 from groundstation.results.flight import FlightResults, Status
-from groundstation.results.recorded import recorded
+from groundstation.results.recorded import recorded, simulated
 
 NOTES = ("note", "notes", "comment", "comments", "remark", "remarks")  # keys of what the head of a log says of itself
 LONGEST_NOTE = 240
@@ -49,9 +49,9 @@ def front(results: FlightResults, chapters: Chapters, answers: Sequence[Section]
 
 
 def note_of_log(results: FlightResults) -> str:
-    """Return what the head of the log says of how it was made, in a line; else nothing."""
+    """Return in a line that a simulator made the log, and what its head says of it."""
     texts = {key.lower(): clean(text).strip() for key, text in results.metadata.items()}
-    told = ""
+    told = simulated(results)
     for text in filter(None, (texts.get(key, "") for key in NOTES)):
         told = told if text in told else "; ".join(filter(None, (told, text)))
     return told if len(told) <= LONGEST_NOTE else f"{told[: LONGEST_NOTE - 4].rpartition(' ')[0]} ..."

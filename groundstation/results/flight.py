@@ -45,7 +45,8 @@ class Source:
 
 KIND_OF_VEHICLE = "vehicle.kind"  # keys of the metadata: rolls, flies, walks, floats or unknown
 WHY_THAT_VEHICLE, PHASES_BY = "vehicle.why", "phases.method"
-FOUND_BY_RUN = (KIND_OF_VEHICLE, WHY_THAT_VEHICLE, PHASES_BY)  # facts that no log has: a run adds them
+SIMULATED_BY = "vehicle.simulated"  # what tells that a simulator made the log
+FOUND_BY_RUN = (KIND_OF_VEHICLE, WHY_THAT_VEHICLE, PHASES_BY, SIMULATED_BY)  # facts that no log has: a run adds them
 NAT_NS = np.iinfo(np.int64).min  # numpy's "not a time"
 UTC_OF = {"time_s": "utc", "start_s": "start_utc", "end_s": "end_utc"}  # columns of flight seconds, and their UTC
 

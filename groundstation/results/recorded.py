@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from groundstation.base.ledger import Ledger, TopicEntry
 from groundstation.base.signals import RAW_PREFIX, is_canonical, kind_of
 from groundstation.base.words import clock_text, counted, listed
-from groundstation.results.flight import FlightResults
+from groundstation.results.flight import SIMULATED_BY, FlightResults
 from groundstation.results.roles import WordsOfRecord
 
 # Kinds of signals in the order they are named, and their names for people; others are counted.
@@ -43,6 +43,12 @@ def recorded(results: FlightResults) -> str:
     'no signals; nothing lost'
     """
     return f"{contents(results)}; {wholeness(results)}"
+
+
+def simulated(results: FlightResults) -> str:
+    """Return ``simulated vehicle (SIMSTATE)`` where a simulator made the log; else nothing."""
+    told = results.metadata.get(SIMULATED_BY, "")
+    return f"simulated vehicle ({told})" if told else ""
 
 
 def contents(results: FlightResults) -> str:

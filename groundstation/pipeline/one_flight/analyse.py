@@ -30,12 +30,14 @@ from groundstation.pipeline.one_flight.intervals import seconds_of
 from groundstation.results.answer import Answers, answer_meeting
 from groundstation.results.chosen import Interval, chosen_intervals
 from groundstation.results.figures import FigureData
-from groundstation.results.flight import FlightResults, NotAssessable, Source, Status
+from groundstation.results.flight import SIMULATED_BY, FlightResults, NotAssessable, Source, Status
 from groundstation.results.roles import HeadingByTrack
 from groundstation.systems import systems
 from groundstation.systems.analysis import Analysis, Found, in_order_of_need
 from groundstation.systems.known import Known
 from groundstation.tables.phases import flight_phases
+from groundstation.tables.simulated import CODE as SIMULATED
+from groundstation.tables.simulated import simulated_by
 from groundstation.tables.table import Flight
 from groundstation.tables.vehicle import ALWAYS_ON_GROUND, CONTRADICTION, STATED_BY, VEHICLE
 
@@ -100,6 +102,10 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
     findings = [*given.findings, *(Finding("warn", "plug_in.system", line) for line in systems().failures)]
     if known.phases.vehicle.contradiction:
         findings.append(Finding("warn", CONTRADICTION, known.phases.vehicle.contradiction))
+    simulator = simulated_by(flight)
+    if simulator:
+        text = f"simulated vehicle ({simulator}): GNSS, vibration, latency and errors are those of models"
+        findings.append(Finding("info", SIMULATED, text))
     for analysis in systems().analyses:
         findings += found.findings.get(analysis.name, ())
         findings += (
@@ -111,7 +117,7 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
     return FlightResults(
         flight_id=given.flight_id,
         source=given.source,
-        metadata=MappingProxyType({**flight.metadata, **overview.phase_facts(known.phases)}),
+        metadata=MappingProxyType({**flight.metadata, **overview.phase_facts(known.phases), **_simulated(simulator)}),
         start_utc_ns=flight.start_ns if flight.has_utc else None,
         duration_s=flight.duration_s,
         status=_status(given, findings),
@@ -124,6 +130,10 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
         figures=tuple(figures),
         chosen=chosen_intervals(configuration.to_dict()),
     )
+
+
+def _simulated(simulator: str) -> dict[str, str]:
+    return {SIMULATED_BY: simulator} if simulator else {}
 
 
 def _as_stated(flight: Flight, configuration: Configuration) -> Flight:

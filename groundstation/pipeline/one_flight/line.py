@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from groundstation.base.failures import attempt
 from groundstation.chapters.by_answer import answers_in_order, loss_above
 from groundstation.results.flight import FlightResults
-from groundstation.results.recorded import recorded
+from groundstation.results.recorded import recorded, simulated
 
 if TYPE_CHECKING:
     from groundstation.systems.system import Systems
@@ -15,7 +15,14 @@ DATA_LOST = "data lost"
 
 
 def line_of_results(results: FlightResults, systems: "Systems") -> str:
-    """Return the results of a flight in one line, the answer first that its page opens with."""
+    """Return the results of a flight in one line, the answer first that its page opens with.
+
+    Before all stands that a simulator made the log.
+    """
+    return "; ".join(filter(None, (simulated(results), _told(results, systems))))
+
+
+def _told(results: FlightResults, systems: "Systems") -> str:
     said = ((one.name, attempt("line", one.name, one.sentence, results.answers)) for one in systems.analyses)
     texts = {name: text for name, text in said if text}
     if not texts:

@@ -220,10 +220,17 @@ def _measures(answer: AutopilotHealth) -> Grid:
     return Grid("Every quantity", heads, rows, "Logged: share of the time in the air.")
 
 
+def _estimator(answer: AutopilotHealth) -> list[tuple[str, str, str]]:
+    if not answer.estimator:
+        return []
+    told = "none: the simulator's truth" if answer.estimator == "simulator" else answer.estimator
+    return [("Estimator that flew it", told, typeset(answer.estimator_source))]
+
+
 def _basis(answer: AutopilotHealth) -> Facts:
-    pairs = [
+    pairs: list[tuple[str, str, str]] = [
         ("Autopilot", answer.autopilot, ""),
-        *([("Estimator that flew it", answer.estimator, typeset(answer.estimator_source))] if answer.estimator else []),
+        *_estimator(answer),
         ("Judged", answer.judged_over, typeset(answer.judged_by)),
         ("Time judged", clock(answer.judged_s), "min:s"),
     ]
