@@ -12,6 +12,15 @@ class GnssStates(Arrays, figure="gnss_states", digits={"start_s": 3, "end_s": 3}
     state: Texts
 
 
+class GnssMissing(Arrays, figure="gnss_missing", digits={"after_s": 3, "next_s": 3, "epochs": 0}):
+    """Epochs that the rate of a receiver expects and the log lacks, one row a place."""
+
+    topic: Texts
+    after_s: Floats
+    next_s: Floats
+    epochs: Floats
+
+
 class GnssQuality(
     Arrays,
     figure="gnss_quality",

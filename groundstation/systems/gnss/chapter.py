@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from groundstation.base.words import capitalised
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, Tone, kept
@@ -18,10 +20,12 @@ from groundstation.systems.gnss.answer import (
     ReceiverPair,
     StandstillScatter,
 )
+from groundstation.systems.gnss.arrays import GnssMissing
 from groundstation.systems.gnss.wording_answer import (
     length_text,
     meaning_of,
     memory_of,
+    missing_of,
     name_of,
     same_claims,
     seconds_text,
@@ -63,6 +67,7 @@ def gnss(results: FlightResults) -> Section | None:
         parts += [Figure("gnss.quality", of=one.topic), *_standstill(one, answer), *_motion(one, answer)]
     parts += [
         _losses(answer),
+        _missing(answer, results.rows_of(GnssMissing)),
         _jumps(answer),
         *(Note(with_full_stop(typeset(texts_text(one)))) for one in answer.texts),
     ]
@@ -295,6 +300,24 @@ def _losses(answer: GnssReception) -> Part | None:
         for topic, loss in longest
     ]
     return Grid("Losses and gaps", heads, told, _most(len(rows), "longest"))
+
+
+def _missing(answer: GnssReception, places: GnssMissing | None) -> Part | None:
+    """Return the places of missing epochs, the longest of many; None without any."""
+    if places is None:
+        return None
+    longest = np.sort(np.argsort(-places.epochs, kind="stable")[:MOST_ROWS]).tolist()
+    told = [
+        (
+            *(str(places.topic[at]), clock(float(places.after_s[at])), clock(float(places.next_s[at]))),
+            number(float(places.epochs[at]), 0),
+        )
+        for at in longest
+    ]
+    heads = (Head("Receiver"), Head("Last row before"), Head("Next row"), Head("Epochs", True))
+    counts = "; ".join(f"{one.topic}: {missing_of(one)}" for one in answer.receivers if one.missed_epochs)
+    caption = f"{with_full_stop(counts)} {_most(len(places.epochs), 'longest')}".strip()
+    return Grid("Missing epochs", heads, told, caption, ("gnss_missing",))
 
 
 def _jumps(answer: GnssReception) -> Part | None:

@@ -13,7 +13,14 @@ from groundstation.base.signals import kind_of, topics_of_kind
 from groundstation.results.figures import FigureData
 from groundstation.results.roles import Delay, Delays
 from groundstation.systems.gnss.answer import WITHOUT_FIX, WITHOUT_RECORD, GnssReceiver, GnssReception
-from groundstation.systems.gnss.arrays import GnssAveraging, GnssPairs, GnssQuality, GnssStandstill, GnssStates
+from groundstation.systems.gnss.arrays import (
+    GnssAveraging,
+    GnssMissing,
+    GnssPairs,
+    GnssQuality,
+    GnssStandstill,
+    GnssStates,
+)
 from groundstation.systems.gnss.judge import Judged, judge, judge_pair, worst_of
 from groundstation.systems.gnss.motion import Steps, steps_of
 from groundstation.systems.gnss.pairs import ComparedReceivers, compare
@@ -246,12 +253,27 @@ def _figures(found: Sequence[One], pairs: Sequence[ComparedReceivers]) -> tuple[
         ),
         _quality(found),
     ]
+    missing = [(one.rows, at) for one in found if (at := np.flatnonzero(_missing(one.rows))).size]
+    if missing:
+        figures.append(
+            GnssMissing(
+                topic=np.concatenate([np.full(len(at), rows.topic) for rows, at in missing]),
+                after_s=np.concatenate([rows.time_s[at] for rows, at in missing]),
+                next_s=np.concatenate([rows.time_s[at + 1] for rows, at in missing]),
+                epochs=np.concatenate([_missing(rows)[at] for rows, at in missing]),
+            )
+        )
     stood = [(one.rows, one.stood) for one in found if one.stood is not None]
     if stood:
         figures += [_standstill(stood), _averaging(stood)]
     if pairs:
         figures.append(_pairs(pairs))
     return tuple(figures)
+
+
+def _missing(rows: ReceiverRows) -> FloatArray:
+    missing = rows.missing
+    return np.zeros(0) if missing is None else missing.astype(np.float64)
 
 
 def _thinned(count: int) -> slice:

@@ -106,15 +106,27 @@ class ReceiverRows:
         return (self.steps_s > self.gap_s) | (np.diff(self.time_s) > self.steps_s + 1e-6)
 
     @property
+    def missing(self) -> NDArray[np.intp] | None:
+        """Epochs that are missing behind each row but the last, shape (n - 1,).
+
+        A row that is late, and whose neighbour catches up, misses none. None where the rate is not regular.
+        """
+        steps = self.steps_s
+        if not len(steps) or np.mean(np.abs(steps - self.step_s) <= REGULAR_STEP * self.step_s) < REGULAR_SHARE:
+            return None
+        alone = np.round(steps / self.step_s) - 1.0
+        beyond = np.pad(steps / self.step_s - 1.0, 1)
+        around = np.round(beyond[:-2] + beyond[1:-1] + beyond[2:])
+        return np.maximum(np.minimum(alone, around), 0.0).astype(np.intp)
+
+    @property
     def missed(self) -> int | None:
         """Epochs that are missing between the first and the last row.
 
         None where the rate is not regular.
         """
-        steps = self.steps_s
-        if not len(steps) or np.mean(np.abs(steps - self.step_s) <= REGULAR_STEP * self.step_s) < REGULAR_SHARE:
-            return None
-        return int(np.maximum(np.round(steps / self.step_s) - 1.0, 0.0).sum())
+        missing = self.missing
+        return None if missing is None else int(missing.sum())
 
 
 def series_of(flight: Flight, topic: str, settings: GnssSettings) -> ReceiverRows:

@@ -65,7 +65,14 @@ def _lost(one: GnssReceiver) -> str:
     told = [_times("lost", lost), _times("nothing recorded", gaps)]
     if not lost and one.lost_s > 0.0:
         told[0] = f"lost for {seconds_text(one.lost_s)}"
-    return listed(told) or "nothing lost"
+    return listed(told) or ("nothing lost" if not one.missed_epochs else f"fix never lost, {missing_of(one)}")
+
+
+def missing_of(one: GnssReceiver) -> str:
+    """Return how many epochs are missing, of how many that the rate expects."""
+    missed = one.missed_epochs or 0
+    expected = one.rows - one.repeated_rows + missed
+    return f"{missed} of {expected} epochs missing"
 
 
 def _times(what: str, seconds: list[float]) -> str:

@@ -9,6 +9,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
 from groundstation.integrity.ledger import gaps_of
 from groundstation.systems.gnss.answer import VelocityAgainstPosition
+from groundstation.systems.gnss.arrays import GnssMissing
 from groundstation.systems.gnss.examine import shortfalls_of
 from groundstation.systems.gnss.settings import GnssSettings
 from groundstation.systems.gnss.wording_answer import meaning_of, same_claims
@@ -443,3 +444,23 @@ def test_all_nan_and_shuffled_fields_are_no_error() -> None:
     time_s = times(1.0)
     for name in ("latitude_deg", "velocity_north_mps", "altitude_ellipsoid_m", "hdop", "satellites_used"):
         assert answer(table(time_s, **{name: np.full(len(time_s), np.nan)})).sentence
+
+
+def test_missing_epochs_are_counted_and_placed_and_never_stand_beside_nothing_lost() -> None:
+    time_s = np.delete(np.arange(0.0, 200.0, 0.5), [40, 100, 101])
+    found = reception(table(time_s))
+    one = found.answer.receiver
+    assert one.missed_epochs == 3
+    assert "nothing lost" not in found.answer.sentence
+    assert "fix never lost, 3 of 400 epochs missing" in found.answer.sentence
+    places = next(figure for figure in found.answer.figures if isinstance(figure, GnssMissing))
+    assert places.after_s.tolist() == [19.5, 49.5] and places.next_s.tolist() == [20.5, 51.0]
+    assert places.epochs.tolist() == [1.0, 2.0]
+
+
+def test_a_row_that_is_late_is_no_missing_epoch() -> None:
+    time_s = np.arange(0.0, 200.0, 0.5)
+    time_s[[40, 90]] += 0.3
+    found = reception(table(time_s))
+    assert found.answer.receiver.missed_epochs == 0 and "nothing lost" in found.answer.sentence
+    assert not any(isinstance(figure, GnssMissing) for figure in found.answer.figures)
