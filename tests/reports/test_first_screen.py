@@ -17,7 +17,7 @@ OPENS = {
         "control of attitude lost 1:17.6-1:20.5 with output 2 suspect",
         "nothing logged for 21 s while disarmed",
     ),
-    "dataflash/plane_4.2.3_pilot0004.BIN": ("bad", "Bad", "GNSS bad throughout", "GNSS at 5 Hz"),
+    "dataflash/plane_4.2.3_pilot0004.BIN": ("bad", "Bad", "GNSS bad 82 % of the time", "GNSS at 5 Hz"),
     "ulog/px4_rs_esc_status.ulg": ("warn", "Warnings", "Vibration raised 0:12", "40 s of GNSS"),
     "ulog/quadrotor_local.ulg": ("bad", "Bad", "“Low battery” at 1:19", "never a fix"),
     "ulog/sample_px4_events.ulg": ("good", "Good", "GNSS good, filter healthy", "nothing lost"),

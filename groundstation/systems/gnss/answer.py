@@ -330,5 +330,4 @@ class GnssReception(Answer, WordsOfRecord):
         best = max(states, key=lambda one: one.share, default=None)
         if best is None or best.share < LEAST_TOLD:
             return {}
-        share = min(self.receiver.share_after_first_fix(best.state), 1.0)
-        return {"gnss": f"{STATE_NAMES[best.state]} {100.0 * share:.0f} %"}
+        return {"gnss": f"{STATE_NAMES[best.state]} {100.0 * best.share:.0f} %"}

@@ -79,7 +79,7 @@ def gnss(results: FlightResults) -> Section | None:
 def _claim(answer: GnssReception) -> Claim:
     main = answer.receiver
     best = max(main.fixes, key=lambda one: one.share, default=None)
-    value = "" if best is None else share_text(main.share_after_first_fix(best.state))
+    value = share_text(0.0 if best is None else main.share(best.state))  # of all its time, as in the table
     remark = "" if best is None else name_of(best.state)
     told = [
         ("Satellites", number(main.satellites_used, 0), "median"),

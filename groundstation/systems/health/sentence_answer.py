@@ -13,8 +13,9 @@ MOST_BAD = 4
 BEGINS = "first: "
 MORE = re.compile(r" and \d+ more$")
 APART_S = 0.05  # failures that begin nearer have no order
-THROUGHOUT = " throughout"
-MOSTLY = 0.8  # of the time: a longer span is "throughout"
+THROUGHOUT, OF_THE_TIME = " throughout", " % of the time"
+MOSTLY = 0.8  # of the time: a longer span needs no times
+WHOLE = 0.995  # of the time: "throughout", which a share told as 99 % is not
 QUOTED = ("faults", "battery", "gnss", "link")  # checks of which what was said is quoted
 LONGEST = 50  # characters of a message that the sentence quotes
 NAMES: Mapping[str, str] = {"gnss": "GNSS", "innovations": "filter", "vibration": "vibration"}
@@ -53,6 +54,7 @@ OF_QUANTITY: Mapping[str, str] = {  # what a person says where this quantity dec
     "time_slip_s": "filter's clock slipped",
     "supply_v": "supply of the board off",
     "supply_swing_v": "supply of the board swings",
+    "compass_offset": "compass offsets too large",
     "rc_lost": "remote control lost",
     "data_link_lost": "data link lost",
     "gyro_bias_radps": "gyro bias large",
@@ -99,7 +101,7 @@ def told_apart(checks: Sequence[Check], loss: AttitudeLoss | None = None) -> tup
     parts = [part for part in _by_time(bad, loss) if part]
     good = ", ".join(_of_the_first(checks))
     failed = [one for one in bad if one.verdict == "fail"]
-    timed = [one for one in failed if when(one) not in ("", THROUGHOUT)]
+    timed = [one for one in failed if _is_timed(one)]
     first_s = min((one.begins_s or 0.0 for one in timed), default=0.0)
     first = [_part(one, loss) for one in timed if (one.begins_s or 0.0) - first_s < APART_S][:1]
     first = [part for part in parts if part.startswith(BEGINS)] or first
@@ -123,7 +125,7 @@ def _by_time(bad: Sequence[Check], loss: AttitudeLoss | None) -> list[str]:
 
     The first of several failures is named as first, the others as later; those throughout the flight have no order.
     """
-    failed = [one for one in bad if one.verdict == "fail" and when(one) not in ("", THROUGHOUT)]
+    failed = [one for one in bad if one.verdict == "fail" and _is_timed(one)]
     failed.sort(key=lambda one: one.begins_s or 0.0)
     begins = [one.begins_s or 0.0 for one in failed]
     if len(failed) < 2 or begins[1] - begins[0] < APART_S:
@@ -169,10 +171,16 @@ def _special(check: Check) -> str:
     return ""
 
 
+def _is_timed(check: Check) -> bool:
+    """Tell whether a check has an order in time: not where it is bad all of the time, or most."""
+    told_when = when(check)
+    return bool(told_when) and not told_when.endswith((THROUGHOUT, OF_THE_TIME))
+
+
 def when(check: Check, *, in_tenths: bool = False) -> str:
     """Return the worst span or the first event of a check: `` 12:03-12:39``.
 
-    A span shorter than ten seconds is told in tenths.
+    A span shorter than ten seconds is told in tenths. What is bad most of the time is told by its share.
     """
     measure = check.decisive
     if check.first_event_s is not None:
@@ -181,6 +189,6 @@ def when(check: Check, *, in_tenths: bool = False) -> str:
         return ""
     share = measure.red_share if check.verdict == "fail" and measure.red_share else measure.amber_share
     if share is not None and share > MOSTLY:
-        return THROUGHOUT
+        return THROUGHOUT if share >= WHOLE else f" {100.0 * share:.0f}{OF_THE_TIME}"
     start, end = span_words(measure.span_start_s, measure.span_end_s)
     return f" at {start}" if start == end else f" {start}-{end}"

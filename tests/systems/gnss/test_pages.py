@@ -58,6 +58,16 @@ def test_the_page_opens_with_what_is_against_the_reception() -> None:
     assert good.claim.headline.startswith("Single (3D) throughout, nothing lost")
 
 
+def test_the_share_of_the_tile_is_of_all_the_time_and_not_of_that_after_the_first_fix() -> None:
+    time_s = times()
+    late = results_of(table(time_s, fix=np.where(time_s < 0.8 * time_s[-1], "none", "3d")))
+    section, found = gnss(late), late.answer(GnssReception)
+    assert section is not None and section.claim is not None and found is not None
+    assert section.claim.value == "20 %" and section.claim.remark == "single (3D)"
+    assert "then single (3D) throughout" in section.claim.headline
+    assert found.receiver.fix_share == pytest.approx(0.2, abs=0.005)
+
+
 def test_shares_after_the_first_fix_are_never_more_than_all() -> None:
     found = open_flight(real_log("dataflash/plane_4.2.3_pilot0004.BIN")).results.answer(GnssReception)
     assert found is not None

@@ -9,6 +9,7 @@ from groundstation.systems.health.answer import Check, Measure
 from groundstation.systems.health.checks import CHECKS, judge
 from groundstation.systems.health.evidence import Event, Evidence, Spans, in_the_air
 from groundstation.systems.health.limits import Limit, shipped, thresholds
+from groundstation.systems.health.sentence_answer import told
 from groundstation.systems.health.settings import HealthSettings
 from groundstation.systems.known import Known
 from groundstation.tables.phases import PhaseInterval, Phases
@@ -176,3 +177,10 @@ def test_a_flight_that_speed_and_height_make_likely_is_judged() -> None:
     air = in_the_air(bare, Known(Phases((proven,), "motion", likely=likely)))
     assert air.seconds == pytest.approx(60.0)
     assert in_the_air(bare, Known(Phases((proven,), "motion"))).seconds == pytest.approx(20.0)
+
+
+@pytest.mark.parametrize(("share", "words"), [(0.82, "82 % of the time"), (1.0, "throughout")])
+def test_throughout_is_all_of_the_time_and_less_is_told_as_a_share(share: float, words: str) -> None:
+    time_s = np.arange(0.0, 100.0, 0.1)
+    few = evidence("satellites", time_s, np.where(time_s < 10.0 + 80.0 * share, 0.0, 12.0))
+    assert told(tuple(checked(few).values())).startswith(f"GNSS bad {words}")
