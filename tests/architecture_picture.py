@@ -26,6 +26,7 @@ def statements(node: ast.AST) -> Iterator[ast.AST]:
 
 
 @cache
+@cache
 def import_nodes(path: Path) -> tuple[ast.Import | ast.ImportFrom, ...]:
     """The imports of a file, inside functions too."""
     nodes = statements(ast.parse(path.read_text(encoding="utf-8")))
