@@ -85,6 +85,12 @@ def head_of(path: Path) -> ProfileHead:
     )
 
 
+def _may_be_header(line: str, required: Sequence[str]) -> bool:
+    """Tell whether all names begin where a cell may: ``gnss.latitude_deg`` is no cell of the name behind its point."""
+    is_quick = bool(required) and all(name in line for name in required)
+    return is_quick and all(re.search(rf"(?<![\w.]){re.escape(name)}", line) for name in required)
+
+
 @cache
 def _heads() -> tuple[ProfileHead, ...]:
     return tuple(map(head_of, sorted(SHIPPED.glob("*.toml"))))
@@ -105,6 +111,6 @@ def that_may_fit(source: Source) -> tuple[Path, ...]:
         if not head.first_lines:
             return False
         is_its_own = begins.is_that_of(head.first_lines) or begins.is_above(head.first_lines)
-        return is_its_own or (bool(head.required) and are_named(head.required, lines))
+        return is_its_own or any(_may_be_header(line.text, head.required) for line in lines)
 
     return tuple(head.path for head in _heads() if may_fit(head))
