@@ -13,7 +13,7 @@ from pathlib import Path
 from benchmarks.record import ROUNDS, Book, Goal, by_turns
 from groundstation.base.records import RecordBatch
 from groundstation.readers import registry
-from groundstation.readers.bags.bag import METADATA
+from groundstation.readers.bags.marks import METADATA
 from tests.readers.bag_writer import small_flight, write_ros1, write_ros2
 from tests.readers.telemetry_writer import telemetry
 

@@ -97,6 +97,7 @@ MAY_BE_SHORT = {  # beside __init__.py
     "__main__.py": "python -m groundstation",
     "base/version.py": "read by the build",
     "pipeline/verbs/schema.py": "a command: python -m",
+    "readers/bags/marks.py": "every other log is opened without what reads bags",
     "results/file_names.py": "tells results from logs without loading either",
     "results/forecast_methods.py": "words of the forecast for rooms that name no system",
     "store/marks.py": "every other log is opened without the store",

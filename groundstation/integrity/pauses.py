@@ -51,7 +51,7 @@ class Outline:
 def armings_in(column: Column) -> list[tuple[int, bool]]:
     """Return rows of a column of event names that tell of arming, and which it is."""
     values = np.asarray(column.values, dtype=np.str_)
-    rows = np.flatnonzero((np.char.find(values, ARMED) >= 0) & column.mask)
+    rows = np.flatnonzero((np.strings.find(values, ARMED) >= 0) & column.mask)
     found = []
     for row in rows.tolist():
         told = [name for name in str(values[row]).split(EVENT_SEPARATOR) if name in (ARMED, DISARMED)]

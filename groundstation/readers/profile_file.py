@@ -16,14 +16,8 @@ from groundstation.readers.profile_columns import ColumnChecker
 from groundstation.readers.profile_times import TimeChecker
 from groundstation.readers.profile_values import Checker, profile_text, table_of
 
-SHIPPED = Path(__file__).parent / "profiles"
 MOST_WIDTHS = 10_000
 _DOUBT = re.compile(r"(?:^|\s)#\s(?:.*;\s)?\?\s(?P<doubt>.*\S)")
-
-
-def shipped() -> tuple[Profile, ...]:
-    """The profiles that come with the package, by name."""
-    return tuple(load(path) for path in sorted(SHIPPED.glob("*.toml")))
 
 
 def load(path: Path) -> Profile:

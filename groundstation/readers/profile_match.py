@@ -8,39 +8,32 @@ from groundstation.base.errors import UnreadableLogError
 from groundstation.readers.dialect import HeadLine, detect_encoding, head_lines, split_cells
 from groundstation.readers.profile import Profile
 from groundstation.readers.profile_fit import Fit, delimiter_of, delimiters_of, fit_at, joined_gaps
-from groundstation.readers.profile_sources import known_profiles, other_profiles
+from groundstation.readers.profile_heads import DAMAGED_HEAD_LINES, are_named, beginning_of, that_may_fit
+from groundstation.readers.profile_sources import profiles_for
 from groundstation.readers.source import Source
 from groundstation.readers.spaced import FixedSource, SpacedSource
 
 DISTINCTIVE_COLUMNS = 4
-DAMAGED_HEAD_LINES = 20  # lines searched for a header row when the first line is not the profile's
 MOST_LINES = 10_000  # lines searched for it otherwise
 _HEAD_LINES = 1000
-_OF_NUMBERS = frozenset(b"%c" % sign for sign in b"0123456789+-.,;")
 _A_NUMBER = re.compile(r"\s*[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?\s*")
-_COMMENTS = re.compile(r"\A(?:#[^\n]*\n\s*)+")
 
 
 def best_fit(source: Source) -> tuple[float, Fit] | None:
     """Return the shipped profile that fits a file, and how sure that is."""
-    first = source.head[:4096].removeprefix(b"\xef\xbb\xbf").decode("utf-8", errors="replace").lstrip()
-    others = set(map(id, other_profiles().profiles))
-    profiles = [profile for profile in known_profiles() if profile.first_lines or id(profile) in others]
-    row = _COMMENTS.sub("", first)  # the first line that is none of the metadata above a header
-    is_one = any(first.startswith(profile.first_lines) for profile in profiles if profile.first_lines)
+    begins = beginning_of(source)
+    profiles = profiles_for(that_may_fit(source))
+    is_one = any(begins.first.startswith(profile.first_lines) for profile in profiles if profile.first_lines)
     encoding = detect_encoding(source.head, source.name)
-    below = (
-        {profile.name for profile in profiles if _stands_below(source, profile)} if _begins_with_rows(source) else set()
-    )
+    below = {profile.name for profile in profiles if begins.is_above(profile.first_lines)}
     most = MOST_LINES if below else _HEAD_LINES if is_one else DAMAGED_HEAD_LINES
     lines = head_lines(source, encoding, most)
     found: list[tuple[float, Fit]] = []
     last = len(lines)  # a relative has its header near by
     for profile in profiles:
-        is_its_own = first.startswith(profile.first_lines) or row.startswith(profile.first_lines)
+        is_its_own = begins.is_that_of(profile.first_lines)
         is_near = not is_its_own and profile.name not in below
-        near = lines[:DAMAGED_HEAD_LINES]
-        if is_near and not any(all(name in line.text for name in profile.required) for line in near):
+        if is_near and not are_named(profile.required, lines):
             continue
         profile = profile.for_file(source.name)
         seen = head_lines(seen_as(source, profile), encoding, most) if profile.is_spaced else lines
@@ -69,19 +62,6 @@ def _named_by(profile: Profile, encoding: str, lines: Sequence[HeadLine]) -> Fit
     wanted = [name for rule in profile.columns if not rule.is_optional for name in rule.names]
     is_all = fit is not None and all(name in fit.position for name in wanted)
     return fit if is_all and len({*wanted, *profile.required}) >= DISTINCTIVE_COLUMNS - 1 else None
-
-
-def _begins_with_rows(source: Source) -> bool:
-    """Tell whether a file begins with numbers, even if the first row is cut."""
-    return any(line.strip()[:1] in _OF_NUMBERS for line in source.head[:4096].split(b"\n", 2)[:2])
-
-
-def _stands_below(source: Source, profile: Profile) -> bool:
-    """Tell whether the profile's first line stands below the rows of another log.
-
-    The beginning of that other log is lost.
-    """
-    return any(b"\n" + line.encode() in source.head for line in profile.first_lines)
 
 
 def _fit(profile: Profile, encoding: str, lines: Sequence[HeadLine]) -> Fit | None:

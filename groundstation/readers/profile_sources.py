@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.plug_ins import load_plug_ins
+from groundstation.readers.profile_heads import SHIPPED
 
 if TYPE_CHECKING:
     from groundstation.readers.profile import Profile
@@ -68,16 +69,21 @@ def _loaded(folder: Path, _state: tuple[object, ...]) -> OtherProfiles:
 
 def known_profiles() -> "tuple[Profile, ...]":
     """List the profiles that are tried on every table: those of others before ours."""
+    return profiles_for(sorted(SHIPPED.glob("*.toml")))
+
+
+def profiles_for(shipped: Iterable[Path]) -> "tuple[Profile, ...]":
+    """List the profiles of others, then some of the shipped ones."""
     others = other_profiles().profiles
     taken = {profile.name for profile in others}
-    return (*others, *(profile for profile in _shipped() if profile.name not in taken))
+    return (*others, *(profile for profile in map(_shipped, shipped) if profile.name not in taken))
 
 
 @cache
-def _shipped() -> "tuple[Profile, ...]":
-    from groundstation.readers.profile_file import shipped
+def _shipped(path: Path) -> "Profile":
+    from groundstation.readers.profile_file import load
 
-    return shipped()
+    return load(path)
 
 
 def known_as(path: Path) -> Path:
@@ -87,8 +93,6 @@ def known_as(path: Path) -> Path:
     """
     if len(path.parts) != 1 or path.exists():
         return path
-    from groundstation.readers.profile_file import SHIPPED
-
     names = ((one.path, one.name) for one in other_profiles().profiles)
     other = next((found for found, name in names if path.name in (name, found.stem, found.name)), None)
     shipped_path = SHIPPED / f"{path.name.replace('-', '_')}.toml"

@@ -18,6 +18,7 @@ from threading import local
 from types import TracebackType
 from typing import Any, BinaryIO, Self
 
+import mcap
 import numpy as np
 import zstandard
 from mcap.opcode import Opcode
@@ -46,7 +47,7 @@ from groundstation.store.framing import chunk_head, message_index, to_bytes
 from groundstation.store.info import COPY_NAME, StoreInfo
 from groundstation.store.marks import MAGIC, METADATA_NAME, PACKAGE
 
-LIBRARY = f"groundstation {__version__}"
+LIBRARY, MCAP_VERSION = f"groundstation {__version__}", mcap.__version__
 # Higher levels save 4 to 7 % of recorded flights and read random mantissas a quarter slower: docs/decisions/007.
 ZSTD_LEVEL = -1
 MEMORY_BYTES = 32 << 20  # finished chunks kept in memory; when there are more, all go to the spool

@@ -18,7 +18,8 @@ from groundstation.pipeline.one_flight.flight import read_flight
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.readers import registry
 from groundstation.readers.bags import definitions, shapes
-from groundstation.readers.bags.bag import METADATA, files_of
+from groundstation.readers.bags.bag import files_of
+from groundstation.readers.bags.marks import METADATA
 from groundstation.tables.table import Flight
 from tests.readers.bag_values import decoded
 from tests.readers.bag_writer import LAG_NS, START_NS, Messages, small_flight, write_ros1, write_ros2

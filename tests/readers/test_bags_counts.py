@@ -9,8 +9,8 @@ import pytest
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.readers import registry
-from groundstation.readers.bags.bag import METADATA
-from groundstation.readers.bags.ros1_records import CHUNK, CHUNK_INFO, CONNECTION, INDEX, MAGIC, head_at
+from groundstation.readers.bags.marks import METADATA, ROS1_MAGIC
+from groundstation.readers.bags.ros1_records import CHUNK, CHUNK_INFO, CONNECTION, INDEX, head_at
 from groundstation.readers.source import Source
 from tests.readers.bag_writer import small_flight, write_ros1, write_ros2
 from tests.readers.test_contract import check
@@ -34,7 +34,7 @@ def missing(damages: list[Damage]) -> int:
 
 def records(data: bytes) -> Iterator[tuple[int, int, int]]:
     """Operation, first byte and end of each record outside of chunks."""
-    at = len(MAGIC)
+    at = len(ROS1_MAGIC)
     while (head := head_at(data, at)) is not None:
         yield head.op, at, head.end
         at = head.end
@@ -384,7 +384,7 @@ def test_layouts_that_are_ever_new_are_given_up(tmp_path: Path, monkeypatch: pyt
 
     texts = [message(at, at.to_bytes(4, "little") + bytes(4 * at)) for at in range(300)]
     path = tmp_path / "a.bag"
-    path.write_bytes(MAGIC + packed(connection(b"string[] texts") + b"".join(texts)))
+    path.write_bytes(ROS1_MAGIC + packed(connection(b"string[] texts") + b"".join(texts)))
     rows, damages = read(path)
     assert rows == 300 and not [one for one in damages if "work" in one.what]
     monkeypatch.setattr(work, "FREE_STEPS", FEW_STEPS)
@@ -400,7 +400,7 @@ def test_more_messages_than_a_file_can_hold_are_not_read(tmp_path: Path, monkeyp
     monkeypatch.setattr(work, "FREE_MESSAGES", 100)
     path = tmp_path / "a.bag"
     one = message(0, bytes(8))
-    path.write_bytes(MAGIC + packed(connection(b"float64 value") + one * 20_000))
+    path.write_bytes(ROS1_MAGIC + packed(connection(b"float64 value") + one * 20_000))
     rows, damages = read(path)
     assert 100 < rows < 20_000 and any("no file of its size holds" in damage.what for damage in damages)
 
@@ -411,7 +411,9 @@ def test_chunks_expand_to_so_many_times_the_file(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(ros1, "FREE_BYTES", 50_000)
     path = tmp_path / "a.bag"
     one = packed(message(0, bytes(1_000_000)))
-    path.write_bytes(MAGIC + packed(connection(b"uint8[1000000] image") + message(0, bytes(1_000_000))) + one * 300)
+    path.write_bytes(
+        ROS1_MAGIC + packed(connection(b"uint8[1000000] image") + message(0, bytes(1_000_000))) + one * 300
+    )
     rows, damages = read(path)
     assert 0 < rows < 301 and any("cannot" in damage.what or "size" in damage.what for damage in damages)
 

@@ -15,6 +15,8 @@ from groundstation.readers import profile_file as profiles
 from groundstation.readers import registry
 from groundstation.readers.layout import METHODS
 from groundstation.readers.profile import TIME_UNITS
+from groundstation.readers.profile_heads import SHIPPED, head_of, that_may_fit
+from groundstation.readers.source import Source
 from tests.readers.test_flat_csv import Read
 
 BASIC = 'name = "p"\n[time]\nkind = "seconds"\ncolumn = "t"\n'
@@ -396,7 +398,7 @@ def test_a_slip_names_file_and_key(tmp_path: Path, text: str, key: str) -> None:
     assert "my.toml" in str(caught.value) and "\n" not in str(caught.value)
 
 
-WHOLE = (Path(profiles.SHIPPED) / "garmin_g1000.toml").read_text(encoding="utf-8")
+WHOLE = (Path(SHIPPED) / "garmin_g1000.toml").read_text(encoding="utf-8")
 JUNK = ["3", "-1.5", "nan", '""', '"junk"', "[]", "[1]", '["a", 2]', "{}", "{ a = 1 }", "true", "2020-01-01"]
 
 
@@ -430,7 +432,7 @@ def test_an_absent_profile_is_a_settings_error(tmp_path: Path) -> None:
 
 
 def test_shipped_profiles_load_and_have_distinct_names() -> None:
-    names = [profile.name for profile in profiles.shipped()]
+    names = [profiles.load(path).name for path in SHIPPED.glob("*.toml")]
     assert "garmin-g1000" in names and len(set(names)) == len(names)
 
 
@@ -536,3 +538,27 @@ def test_two_columns_may_feed_a_field_where_both_are_optional(tmp_path: Path) ->
     _log, settings = files(tmp_path, both.replace(", optional = true", "", 1), "")
     with pytest.raises(SettingsError, match="does not feed already"):
         profiles.load(settings)
+
+
+def test_the_head_of_a_shipped_profile_is_that_of_the_whole() -> None:
+    heads = [head_of(path) for path in sorted(SHIPPED.glob("*.toml"))]
+    assert len(heads) > 10
+    for head in heads:
+        whole = profiles.load(head.path)
+        assert head.first_lines == whole.first_lines
+        assert head.required == (() if whole.names else whole.required)
+
+
+@pytest.mark.parametrize(
+    ("text", "fitting"),
+    [
+        ("time_s,ins.heading_true_deg\n0,1\n", []),
+        ("#airframe_info,a\n#b\nLcl Date, Lcl Time\n", ["garmin_g1000", "garmin_g3x"]),
+        ("torn\ntime,icao24,lat,lon,velocity\n", ["opensky_states"]),
+        ("1,2,3\n#airframe_info,a\n", ["garmin_g1000", "garmin_g3x"]),
+    ],
+)
+def test_a_table_loads_the_profiles_that_its_first_lines_allow(tmp_path: Path, text: str, fitting: list[str]) -> None:
+    log = tmp_path / "a.csv"
+    log.write_text(text, encoding="utf-8")
+    assert [path.stem for path in that_may_fit(Source(log))] == fitting

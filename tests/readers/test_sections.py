@@ -92,7 +92,7 @@ def test_text_that_only_looks_like_a_header(tmp_path: Path) -> None:
 
 def test_too_many_headers_leave_the_rest_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("groundstation.readers.flat_csv.MOST", 3)
-    monkeypatch.setattr("groundstation.readers.csv_profile.MOST", 3)
+    monkeypatch.setattr("groundstation.readers.profile_table.MOST", 3)
     found = read(tmp_path, f"{ONE}\n0,1,2\n{TWO}\n0,2,1\n" * 3)
     assert angles(found) == [(1.0, 2.0)] * 3
     assert (found.damage("dropped_rows").count, found.damage("dropped_rows").place) == (6, "rows 7 to 12")

@@ -411,8 +411,6 @@ def _intervals(listed: Any, where: str) -> tuple[WrittenInterval, ...]:
 
 def _weather(listed: Any, given: Settings | None, where: str) -> tuple[str, ...]:
     """Return METAR lines with a wind: from the text file or mapping given, else the settings."""
-    from groundstation.base.metar import metar_wind
-
     file = given if isinstance(given, Path) else None
     if file is not None:
         listed, where = toml_text(file, str(file), "a text file", "METAR lines").splitlines(), str(file)
@@ -420,6 +418,10 @@ def _weather(listed: Any, given: Settings | None, where: str) -> tuple[str, ...]
         listed = given.get("weather", [])
     if not isinstance(listed, list) or not all(isinstance(line, str) for line in listed):
         raise SettingsError(f"{where}, weather", repr(listed), "a list of METAR lines")
+    if not listed:
+        return ()
+    from groundstation.base.metar import metar_wind
+
     lines = tuple(line.strip() for line in listed if metar_wind(line) is not None)
     if file is not None and not lines:
         raise SettingsError(where, "no METAR line with a wind", "lines such as UUEE 040600Z 27010MPS CAVOK 12/05 Q1013")

@@ -23,7 +23,6 @@ from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.integrity.survey import Census
 from groundstation.pipeline.one_flight.configuration import NO_REFERENCES, References
 from groundstation.pipeline.one_flight.log import Log, Replay
-from groundstation.pipeline.one_flight.parts import LATE_S
 from groundstation.pipeline.one_flight.reference import FACTS, TRUTH, Laid, laid_beside
 from groundstation.pipeline.one_flight.segments import Segment, document_of, segments_in, segments_of
 from groundstation.store.info import StoreInfo
@@ -140,6 +139,8 @@ def _segments(log: Log, found: "Survey") -> tuple[Segment, ...]:
         When the counter starts again in a later file, and nothing tells how the clock goes on.
     """
     if log.parts:
+        from groundstation.pipeline.one_flight.parts import LATE_S
+
         for one, other in pairwise(found.power_ups):
             has_utc = one.is_absolute and other.is_absolute
             if not has_utc or other.start_ns - one.end_ns < -LATE_S * NS_PER_S:
@@ -173,9 +174,8 @@ def _convert_recorded(log: Log, items: Replay, found: "Survey", target: Path, re
 
 def _facts_of(log: Log, found: "Survey", laid: Laid) -> StoreInfo:
     """Return facts of the MCAP of a log, with those of the reference that is laid beside it."""
-    from importlib import metadata as installed
-
     from groundstation.integrity.ledger_findings import ledger_findings
+    from groundstation.store.writer import MCAP_VERSION
 
     of_segment = () if log.segment is None else (log.segment.finding,)
     of_parts = _told_joined(log) if log.parts else ()
@@ -184,7 +184,7 @@ def _facts_of(log: Log, found: "Survey", laid: Laid) -> StoreInfo:
         source_name=log.source.name,
         source_sha256=log.source.sha256,
         reader=found.header.reader,
-        versions={"groundstation": __version__, "mcap": installed.version("mcap")},
+        versions={"groundstation": __version__, "mcap": MCAP_VERSION},
         metadata={**found.header.metadata, **told_of_fields(found.remarks), **laid.facts, **_facts_of_parts(log)},
         has_utc=found.clock.is_absolute,
         start_ns=found.ledger.start_ns,

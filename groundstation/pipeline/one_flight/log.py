@@ -108,7 +108,8 @@ def as_log(path: Path) -> Path:
 
     The metadata for the folder of a bag.
     """
-    from groundstation.readers.bags.bag import METADATA, is_bag_folder
+    from groundstation.readers.bags.kinds import is_bag_folder
+    from groundstation.readers.bags.marks import METADATA
 
     return path / METADATA if path.is_dir() and is_bag_folder(path) else path
 
@@ -128,15 +129,19 @@ def _files_of(path: Path) -> tuple[Path, ...]:
 
     A ROS 2 bag has its metadata and the files named there.
     """
-    from groundstation.readers.bags.bag import files_of
+    if _is_metadata(path):
+        from groundstation.readers.bags.bag import files_of
+
+        return (path, *(file for file in files_of(path) if file.is_file()))
     from groundstation.readers.sbet import accuracies_beside
 
-    others = files_of(path) if _is_metadata(path) else (accuracies_beside(path),)
-    return (path, *(file for file in others if file is not None and file.is_file()))
+    accuracies = accuracies_beside(path)
+    return (path, accuracies) if accuracies is not None and accuracies.is_file() else (path,)
 
 
 def _is_metadata(path: Path) -> bool:
-    from groundstation.readers.bags.bag import METADATA, is_bag_folder
+    from groundstation.readers.bags.kinds import is_bag_folder
+    from groundstation.readers.bags.marks import METADATA
 
     return path.name == METADATA and is_bag_folder(path.parent)
 

@@ -13,7 +13,7 @@ from groundstation.readers.drafts.checked import check_profile
 from groundstation.readers.drafts.draft import Draft as Draft
 from groundstation.readers.drafts.draft import draft_of, facts_of
 from groundstation.readers.profile import Profile
-from groundstation.readers.profile_file import SHIPPED
+from groundstation.readers.profile_heads import SHIPPED
 from groundstation.readers.profile_sources import known_as
 from groundstation.readers.source import Source
 from groundstation.results.files import write_text

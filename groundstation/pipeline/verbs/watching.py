@@ -18,7 +18,7 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Listener, silent
 from groundstation.pipeline.verbs.watched_batch import WatchedLogs, run_batch
-from groundstation.readers.bags.bag import METADATA
+from groundstation.readers.bags.marks import METADATA
 
 UNFINISHED = (".part", ".partial", ".tmp", ".filepart", ".crdownload")  # what programs call a file that still comes
 Signature = tuple[tuple[str, int, int], ...]  # name, size and time of change of every file of a log

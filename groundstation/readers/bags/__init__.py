@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from groundstation.base.records import Item
-from groundstation.readers.bags.bag import is_begun, kind_of
+from groundstation.readers.bags.kinds import is_begun, kind_of
 from groundstation.readers.source import Claim, Source
 
 NAME = "bag"

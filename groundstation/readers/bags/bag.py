@@ -1,6 +1,5 @@
 """Log of messages as one: a single file, or the files that a ROS 2 bag was split into."""
 
-import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -10,66 +9,27 @@ from typing import TypeAlias
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Damage
-from groundstation.readers.bags.mcap import MAGIC as MCAP_MAGIC
+from groundstation.readers.bags.marks import MCAP_MAGIC, METADATA, METADATA_BEGINS, ROS1_MAGIC, SQLITE_MAGIC
 from groundstation.readers.bags.mcap import Mcap
 from groundstation.readers.bags.messages import Connection, ConnectionBlock, Missing, Part, counted_by
 from groundstation.readers.bags.ros1 import Ros1Bag
-from groundstation.readers.bags.ros1_records import MAGIC as ROS1_MAGIC
 from groundstation.readers.bags.ros1_records import has_chunk
 from groundstation.readers.bags.rosbag2_metadata import BagMetadata
 from groundstation.readers.bags.sources import Key, key_of
-from groundstation.readers.bags.sqlite import MAGIC as SQLITE_MAGIC
 from groundstation.readers.bags.sqlite import Ros2Sqlite
 from groundstation.readers.bags.work import most_messages
 from groundstation.readers.joined import JoinedSource
 from groundstation.readers.source import Source
 
-METADATA = "metadata.yaml"
-MARK = b"rosbag2_bagfile_information:"
 KEPT_BYTES, MESSAGE_BYTES = 64 << 20, 64  # messages kept for the second pass; what each adds to its own
 MOST_METADATA_BYTES = 16 << 20
 _ENDINGS = ("", ".zstd")  # rosbag2 names a file it compressed later without the ending
 Item: TypeAlias = ConnectionBlock | Damage
-_CONTAINERS: Mapping[bytes, tuple[str, Callable[[Source], Iterable[Part]]]] = {
-    MCAP_MAGIC: ("MCAP", Mcap),
-    ROS1_MAGIC: ("ROS 1", Ros1Bag),
-    SQLITE_MAGIC: ("ROS 2", Ros2Sqlite),
+_CONTAINERS: Mapping[bytes, Callable[[Source], Iterable[Part]]] = {
+    MCAP_MAGIC: Mcap,
+    ROS1_MAGIC: Ros1Bag,
+    SQLITE_MAGIC: Ros2Sqlite,
 }
-# In the head of an sqlite3 file that is a bag; a table that was renamed has its name in quotes.
-_TABLES = tuple(re.compile(rb"(?i)CREATE TABLE (IF NOT EXISTS )?[\"'`\[]?" + name) for name in (b"topics", b"messages"))
-
-
-def kind_of(source: Source) -> str:
-    """Return the kind of bag that a file is, by its first bytes; empty for none."""
-    if source.head.lstrip().startswith(MARK):
-        return "ROS 2"
-    if source.head.startswith(SQLITE_MAGIC):
-        return "ROS 2" if all(table.search(source.head) for table in _TABLES) else ""
-    kind = next((name for magic, (name, _container) in _CONTAINERS.items() if source.head.startswith(magic)), "")
-    if not kind and has_chunk(source.head):
-        return "ROS 1"
-    return "" if kind == "MCAP" and _is_ours(source) else kind
-
-
-def is_begun(source: Source) -> bool:
-    """Tell whether a file has the first bytes of a bag, or is the metadata of one."""
-    return source.head.lstrip().startswith(MARK) or source.head.startswith(tuple(_CONTAINERS))
-
-
-def _is_ours(source: Source) -> bool:
-    """Tell whether groundstation wrote an MCAP: then the store reads it."""
-    from groundstation.store.recognition import is_groundstation_mcap
-
-    return is_groundstation_mcap(source.head) or is_groundstation_mcap(source.path)  # the second: by what is left of it
-
-
-def is_bag_folder(folder: Path) -> bool:
-    """Tell whether a folder is a bag of ROS 2: rosbag2 puts its metadata there."""
-    try:
-        with (folder / METADATA).open("rb") as stream:
-            return stream.read(4096).lstrip().startswith(MARK)
-    except OSError:
-        return False
 
 
 def files_of(metadata: Path) -> tuple[Path, ...]:
@@ -118,7 +78,7 @@ class Bag:
 
     @property
     def _is_folder(self) -> bool:
-        return self.source.head.lstrip().startswith(MARK)
+        return self.source.head.lstrip().startswith(METADATA_BEGINS)
 
     @cached_property
     def size(self) -> int:
@@ -200,7 +160,7 @@ class Bag:
 
 
 def _parts(file: Source) -> Iterator[Part]:
-    for magic, (_name, container) in _CONTAINERS.items():
+    for magic, container in _CONTAINERS.items():
         if file.head.startswith(magic):
             yield from container(file)
             return

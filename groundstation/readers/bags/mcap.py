@@ -14,7 +14,6 @@ from groundstation.readers.source import Source
 if TYPE_CHECKING:
     from groundstation.store.foreign import ForeignLost, ForeignMessages
 
-MAGIC = b"\x89MCAP0\r\n"
 _HEAD_BYTES = 31  # bytes of a message record before its payload
 
 

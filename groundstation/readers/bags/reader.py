@@ -18,9 +18,10 @@ from groundstation.base.records import (
     Remark,
 )
 from groundstation.base.signals import RAW_PREFIX
-from groundstation.readers.bags.bag import Bag, kind_of
+from groundstation.readers.bags.bag import Bag
 from groundstation.readers.bags.clocks import LARGEST_LAG_S
 from groundstation.readers.bags.decode import DecodedMessages, Decoder
+from groundstation.readers.bags.kinds import kind_of
 from groundstation.readers.bags.messages import Connection, ConnectionBlock, joined
 from groundstation.readers.bags.profile import MessageProfile
 from groundstation.readers.bags.shapes import MOST_COLUMNS

@@ -17,11 +17,11 @@ import numpy as np
 from groundstation.base.records import Damage
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.bags.definitions import plain_name
+from groundstation.readers.bags.marks import ROS1_MAGIC
 from groundstation.readers.bags.messages import Connection, ConnectionBlock, Missing, Part, counted_by
 from groundstation.readers.bags.ros1_records import (
     CHUNK,
     CONNECTION,
-    MAGIC,
     MESSAGE,
     OP,
     Index,
@@ -108,7 +108,7 @@ class Ros1Bag:
         A bag without its index was cut.
         """
         is_told = False
-        if not self._source.head.startswith(MAGIC) and not self._skipped:
+        if not self._source.head.startswith(ROS1_MAGIC) and not self._skipped:
             yield Damage("corrupt", "byte 0", 1, "header of the bag is missing", loses_data=False)
         for number, count in sorted(index.messages.items()):
             lost = count - self._met.get(number, 0)

@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import BinaryIO, NamedTuple
 
-MAGIC = b"#ROSBAG V2.0\n"
+from groundstation.readers.bags.marks import ROS1_MAGIC
+
 MESSAGE, HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7
 MAX_HEADER_BYTES, MOST_FIELDS = 4096, 32  # largest header, and fields in it; also of the description of a connection
 SEARCH_BYTES = 1 << 20
@@ -143,7 +144,7 @@ class Records:
     tries: Tries = field(default_factory=Tries)
 
     def __iter__(self) -> Iterator[Record]:
-        at = len(MAGIC) if self.read(0, len(MAGIC)) == MAGIC else 0
+        at = len(ROS1_MAGIC) if self.read(0, len(ROS1_MAGIC)) == ROS1_MAGIC else 0
         while at < self.size:
             record = self._record(at)
             yield record
@@ -233,7 +234,7 @@ class Index:
     def of(cls, stream: BinaryIO, size: int) -> "Index":
         """Read the index of a file; if it is not at its place, search the records for it."""
         records, found = Records(stream, size), cls()
-        first = records.head(len(MAGIC)) if records.read(0, len(MAGIC)) == MAGIC else None
+        first = records.head(len(ROS1_MAGIC)) if records.read(0, len(ROS1_MAGIC)) == ROS1_MAGIC else None
         if first is not None and first.op == HEADER:
             found.index_at = number_of(first.fields, b"index_pos")
             found.chunks = number_of(first.fields, b"chunk_count")

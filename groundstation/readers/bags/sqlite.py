@@ -27,7 +27,6 @@ from groundstation.readers.bags.rosbag2_metadata import BagMetadata
 from groundstation.readers.compressed import MAX_RATIO, MIN_LIMIT_BYTES
 from groundstation.readers.source import Source
 
-MAGIC = b"SQLite format 3\0"
 TOPICS, MESSAGES, DEFINITIONS, METADATA = "topics", "messages", "message_definitions", "metadata"
 ROWS, BLOCK_BYTES = 2_000, 32 << 20  # taken at once, at most
 STEPS, LOOKS = (

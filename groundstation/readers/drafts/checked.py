@@ -16,6 +16,7 @@ from groundstation.readers.drafts.sample import TableSample, sample_of
 from groundstation.readers.layout import METHODS, Key, LayoutRule, TableLayout
 from groundstation.readers.profile_file import load
 from groundstation.readers.profile_fit import Fit
+from groundstation.readers.profile_table import laid
 from groundstation.readers.source import Source
 
 
@@ -122,7 +123,7 @@ def check_profile(path: Path, table: Path) -> ProfileCheck:
         When the table has no header row of the profile, or cannot be read.
     """
     profile, source = load(path), Source(table)
-    fit, layout = csv_profile.laid(source, profile)
+    fit, layout = laid(source, profile)
     values: dict[Key, _Values] = {}
     remarks, damages = list[Remark](), list[Damage]()
     rows, timed = Counter[str](), 0
