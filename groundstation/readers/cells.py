@@ -53,6 +53,25 @@ class TableCells:
     unreadable: BoolArray
     cut: BoolArray | None = None
 
+    def take(self, index: NDArray[np.integer[Any]]) -> "TableCells":
+        """Return the rows that ``index`` selects."""
+        is_cut = self.cut is not None and self.cut.any()
+        return TableCells(self.column.take(index), self.unreadable[index], self.cut[index] if is_cut else None)
+
+
+def distinct(text: Any) -> tuple[Any, NDArray[np.integer[Any]]]:
+    """Return the distinct cells of a column, a null behind them, and which of them each cell is.
+
+    Examples
+    --------
+    >>> words, index = distinct(pa.array(["nav", None, "nav", "align"]))
+    >>> words.to_pylist(), index.tolist()
+    (['nav', 'align', None], [0, 2, 0, 1])
+    """
+    coded = pc.dictionary_encode(text)
+    words = coded.dictionary
+    return pa.concat_arrays([words, pa.nulls(1, words.type)]), arrow.values(coded.indices, len(words))
+
 
 def trimmed(text: Any) -> Any:
     """Trim cells; a cell of nothing but padding becomes empty (null)."""

@@ -33,6 +33,14 @@ def read_cells(rule: LayoutRule, array: Any, layout: TableLayout, delimiter: str
         Layout of the table that the column is of.
     delimiter : str
     """
+    if pa.types.is_string(array.type) and (rule.kind in ("text", "bool") or rule.values):
+        distinct, index = cells.distinct(array)
+        read, what = _read_each(rule, distinct, layout, delimiter)
+        return read.take(index), what
+    return _read_each(rule, array, layout, delimiter)
+
+
+def _read_each(rule: LayoutRule, array: Any, layout: TableLayout, delimiter: str) -> tuple[TableCells, str]:
     is_text = pa.types.is_string(array.type)
     has_comma = layout.decimal_comma and rule.kind == "double"
 

@@ -36,9 +36,10 @@ def shape_of(lines: bytes, delimiter: str, *, is_compiled: bool = False) -> RowS
         found = np.empty((2, np.count_nonzero(text == _LF)), np.int64)
         count_cells(text, ord(delimiter), found)
         return RowShape(found[0], found[1])
-    ends = np.flatnonzero(text == _LF)
-    delimiters = np.flatnonzero(text == ord(delimiter))
-    return RowShape(ends, np.diff(np.searchsorted(delimiters, ends), prepend=0) + 1)
+    is_end = text == _LF
+    places = np.flatnonzero(is_end | (text == ord(delimiter)))
+    closes = np.flatnonzero(is_end[places])
+    return RowShape(places[closes], np.diff(closes, prepend=-1))
 
 
 def cell_places(lines: bytes, delimiter: str, cells: int, column: int) -> tuple[Int64Array, Int64Array, Int64Array]:

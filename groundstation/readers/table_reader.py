@@ -157,7 +157,7 @@ class TableReader:
                 decimal_point=decimal_point,
             ),
         )
-        return {column: table.column(str(column)).combine_chunks() for column in types}
+        return {column: _whole(table.column(str(column))) for column in types}
 
     def _typed(self, block: RowBlock) -> tuple[Column, dict[Key, Column]]:
         arrays = self._arrays(block)
@@ -285,6 +285,11 @@ class TableReader:
             yield Remark("decimal_comma", "numbers are written with a decimal comma")
         if scanner.ends_without_newline:
             yield Remark("no_final_newline", "the last row has no line end: its last cell may be cut short")
+
+
+def _whole(column: Any) -> Any:
+    """Return a column as one array; that of one chunk is not copied."""
+    return column.chunk(0) if column.num_chunks == 1 else column.combine_chunks()
 
 
 def _zero_of(header: LogHeader, section: TableSection) -> int | None:

@@ -9,11 +9,13 @@ import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from os import SEEK_END
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.failures import CODE, Failure, attempt, with_failures
@@ -310,14 +312,20 @@ def _write_parquet(path: Path, figure: FigureData) -> None:
     import pyarrow.parquet as pq
 
     arrays = {
-        name: pa.array([utf8_text(text) for text in values.tolist()], pa.string())
-        if values.dtype.kind in "UO"
-        else values
+        name: _arrow_texts(values.tolist()) if values.dtype.kind in "UO" else values
         for name, values in figure.columns.items()
     }
     digits = {name: str(figure.digits[name]) for name in figure.digits}
     table = pa.table(arrays).replace_schema_metadata({"digits": json.dumps(digits, sort_keys=True)})
     pq.write_table(table, path, compression="zstd")
+
+
+def _arrow_texts(values: Sequence[Any]) -> Any:
+    import pyarrow as pa
+
+    texts = list(map(str, values))
+    utf8 = {text: utf8_text(text) for text in set(texts)}  # few, each many times
+    return pa.array([utf8[text] for text in texts], pa.string())
 
 
 def _read_parquet(path: Path) -> FigureData:
@@ -350,22 +358,31 @@ def csv_text(figure: FigureData, line_end: str = "\n") -> str:
 
     No cell holds what a spreadsheet would run as a formula.
     """
-    cells = []
+    forms, cells = [], []
     for name, values in figure.columns.items():
-        places = figure.digits.get(name, digits_of(name))
-        if values.dtype.kind == "f":
-            rounded = np.round(values.astype(np.float64), places) + 0.0
-            pairs = zip(rounded.tolist(), np.isfinite(rounded).tolist(), strict=True)
-            form = f"%.{places}f"
-            cells.append([form % value if is_known else "" for value, is_known in pairs])
-        elif values.dtype.kind == "b":
-            cells.append(["1" if value else "0" for value in values.tolist()])
-        else:
-            is_whole = values.dtype.kind in "iu"
-            cells.append([str(value) if is_whole else csv_cell(str(value)) for value in values.tolist()])
-    lines = [",".join(csv_cell(name) for name in figure.columns)]
-    lines += [",".join(row) for row in zip(*cells, strict=True)]
-    return line_end.join(lines) + line_end
+        form, column = _csv_column(values, figure.digits.get(name, digits_of(name)))
+        forms.append(form)
+        cells.append(column)
+    head = ",".join(csv_cell(name) for name in figure.columns)
+    row = line_end + ",".join(forms)
+    rows = len(cells[0]) if cells else 0
+    return head + row * rows % tuple(chain.from_iterable(zip(*cells, strict=True))) + line_end
+
+
+def _csv_column(values: NDArray[Any], places: int) -> tuple[str, list[Any]]:
+    """Return the form of a cell and what goes into it: all cells of a table are written in one go."""
+    kind = values.dtype.kind
+    if kind == "f":
+        rounded = np.round(values.astype(np.float64), places) + 0.0
+        form, numbers, is_known = f"%.{places}f", rounded.tolist(), np.isfinite(rounded)
+        if is_known.all():
+            return form, numbers
+        return "%s", [form % one if known else "" for one, known in zip(numbers, is_known.tolist(), strict=True)]
+    if kind in "biu":
+        return "%d", values.tolist()
+    texts = list(map(str, values.tolist()))
+    cell_of = {text: csv_cell(text) for text in set(texts)}  # few, each many times
+    return "%s", [cell_of[text] for text in texts]
 
 
 def parquet_bytes(table: Any) -> bytes:

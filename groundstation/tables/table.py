@@ -130,7 +130,8 @@ class Table:
             self._absent(name)
             return np.full(len(self), "", dtype="U1")
         column = self.columns[name]
-        return np.where(column.mask, column.values.astype(np.str_), "")
+        texts = column.values.astype(np.str_, copy=False)
+        return texts if column.mask.all() else np.where(column.mask, texts, "")
 
     def take(self, index: Any) -> Self:
         """The rows that ``index`` (slice, mask or positions) selects."""

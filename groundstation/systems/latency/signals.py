@@ -17,6 +17,7 @@ from groundstation.tables.table import Flight, Table
 
 FloatArray = NDArray[np.float64]
 VELOCITY = ("velocity_north_mps", "velocity_east_mps")
+POSITION = ("latitude_deg", "longitude_deg")  # tells the epochs of a receiver apart
 ALTITUDES = ("altitude_ellipsoid_m", "altitude_msl_m")
 FIELD = ("field_forward_nt", "field_right_nt", "field_down_nt")
 ATTITUDE = ("roll_deg", "pitch_deg")
@@ -88,7 +89,8 @@ def compare(flight: Flight, pair: tuple[str, str, Quantity], settings: LatencySe
     shown, seen = _columns(unit, sensor, quantity)
     unit = unit.take(unit.valid(*shown))
     sensor = _compared_part(sensor) if quantity == "attitude" else sensor.trusted()
-    sensor = sensor.take(sensor.valid(*seen))
+    compared = {name: column for name, column in sensor.columns.items() if name in (*seen, *POSITION)}
+    sensor = replace(sensor, columns=compared).take(sensor.valid(*seen))
     for topic, table in ((reference, unit), (other, sensor)):
         _check_stamps(topic, table, settings)
     if quantity == "velocity":
