@@ -5,14 +5,16 @@ from dataclasses import replace
 import pytest
 
 from groundstation.base.ledger import DamageEntry, FieldEntry, Ledger, PauseEntry, TopicEntry, TopicGaps, Truncation
+from groundstation.base.signals import HOW_TO_NAME
 from groundstation.chapters.front import front
-from groundstation.chapters.parts import Mark, Rank
-from groundstation.results.flight import FlightResults
+from groundstation.chapters.parts import Facts, Mark, Rank
+from groundstation.results.flight import FlightResults, NotAssessable
 from groundstation.results.gates import Gate
 from groundstation.results.recorded import contents, great_loss, recorded, wholeness
 from groundstation.systems import systems
 from groundstation.systems.heading.claim_chapter import claim
 from tests.report_example import example, heading_result
+from tests.told import next_steps
 
 MADE = example(None)
 
@@ -36,7 +38,8 @@ def topic(rate_hz: float | None, span_s: float, *fields: str, gaps: tuple[float,
 
 def flight(status: str = "ok", **topics: TopicEntry) -> FlightResults:
     named = {name.replace("_2", ".2").replace("raw_", "raw."): one for name, one in topics.items()}
-    return replace(MADE, ledger=Ledger(topics=named), status=status, duration_s=90.0)
+    spans_s = [one.span_s for name, one in topics.items() if not name.startswith("raw")]
+    return replace(MADE, ledger=Ledger(topics=named), status=status, duration_s=max(spans_s, default=0.0) or 90.0)
 
 
 @pytest.mark.parametrize(
@@ -99,3 +102,36 @@ def test_a_pause_while_disarmed_is_told_apart_from_losses_and_is_no_recorded_tim
     paused = replace(whole, ledger=replace(whole.ledger, pauses=(pause,)))
     assert contents(whole) == "80 s of GNSS at 5 Hz" and contents(paused) == "59 s of GNSS at 5 Hz"
     assert wholeness(paused) == "nothing lost; nothing logged for 21 s while disarmed"
+
+
+def test_rates_of_several_units_are_a_range_as_they_were_logged() -> None:
+    """Five INS of a real recording came at 80, 53, 10, 52 and 10 Hz, and the line said "5 x INS at 82 Hz"."""
+    first = replace(topic(82.3, 0.25, "roll_deg", "latitude_deg"), actual_rate_hz=79.96)
+    second = replace(topic(9.9998, 0.2, "latitude_deg"), actual_rate_hz=9.9998)
+    assert contents(flight(ins=first, ins_2=second)) == "0.25 s of 2 x INS at 10 to 80 Hz"
+    holed = replace(topic(50.0, 100.0, "latitude_deg", gaps=(60.0,)), actual_rate_hz=20.0)
+    assert contents(flight(ins=holed)) == "100 s of INS at 50 Hz", "a gap is no rate"
+
+
+def test_the_length_is_that_of_the_page_to_the_millisecond_where_it_is_short() -> None:
+    short = replace(flight(ins=topic(50.0, 0.25, "latitude_deg")), duration_s=0.6537)
+    assert contents(short) == "0.25 s of INS at 50 Hz in a log of 0.654 s"
+    assert dict(front(short, systems().chapters).pairs)["Duration"] == "0.654 s"
+    longer = replace(short, duration_s=9.9996)
+    assert dict(front(longer, systems().chapters).pairs)["Duration"] == "0:10 min:s"
+
+
+def test_bus_words_without_an_icd_say_what_names_them() -> None:
+    """The line and the advice said "messages without navigation" and to record what the buses may well carry."""
+    words = {f"raw.bus.{name}": topic(None, 0.3, "word") for name in ("1553.4", "429.7")}
+    missing = (NotAssessable("heading", "no GNSS velocity in the log"),)
+    found = replace(MADE, ledger=Ledger(topics=words), duration_s=0.654, not_assessable=missing)
+    assert contents(found) == f"0.654 s of words of 2 bus channels without ICD: {HOW_TO_NAME}"
+    assert "--icd" in HOW_TO_NAME and "--suggest-icd" in HOW_TO_NAME
+    section = next_steps(found)
+    assert section is not None
+    (part,) = section.parts
+    assert isinstance(part, Facts) and [line for line, _, _ in part.pairs] == ["Check"]
+    assert "--icd FILE" in part.pairs[0][1] and "GNSS velocity" not in str(section)
+    named = replace(found, ledger=Ledger(topics={**words, "ins": topic(9.0, 0.3, "roll_deg")}))
+    assert contents(named).startswith("0.3 s of attitude") and "GNSS velocity" in str(next_steps(named))

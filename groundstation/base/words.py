@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 
 NEAR_END_S = 15.0  # a span that ends so near the end of all of it lasts on
+IN_MS_BELOW_S = 9.9995  # a log that is shorter is told to the millisecond
 
 
 def listed(names: Sequence[str]) -> str:
@@ -52,6 +53,20 @@ def clock_text(seconds: float) -> str:
     hours, rest = divmod(round(abs(seconds)), 3600)
     tail = f"{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"
     return f"{hours}:{tail}" if hours else tail
+
+
+def length_text(seconds: float) -> str:
+    """Return how long a log is: in milliseconds below ten seconds, as minutes and seconds beyond.
+
+    Examples
+    --------
+    >>> length_text(0.6537), length_text(2.0), length_text(26.2), length_text(3725.0)
+    ('0.654 s', '2 s', '0:26', '1:02:05')
+    """
+    if not 0.0 < seconds < IN_MS_BELOW_S:
+        return clock_text(seconds)
+    text = f"{seconds:.3f}".rstrip("0").rstrip(".")
+    return f"{text} s" if float(text) else "below 1 ms"
 
 
 def tenths_text(seconds: float) -> str:

@@ -15,13 +15,12 @@ from groundstation.chapters.by_answer import answer_chapters, loss_above
 from groundstation.chapters.chapter import Chapter, Chapters, Pairs
 from groundstation.chapters.grades import legend
 from groundstation.chapters.parts import Cell, Facts, Front, Mark, Note, Section, Tile
-from groundstation.chapters.wording import ABSENT, clean, clock, is_number, typeset
+from groundstation.chapters.wording import ABSENT, clean, duration, typeset
 from groundstation.results.flight import FlightResults, Status
 from groundstation.results.recorded import recorded, simulated
 
 NOTES = ("note", "notes", "comment", "comments", "remark", "remarks")  # keys of what the head of a log says of itself
 LONGEST_NOTE = 240
-HOUR_S = 3599.5  # rounds to an hour
 STATUS: dict[Status, Mark] = {
     "ok": Mark("good", "ok"),
     "degraded": Mark("warn", "degraded: data were lost"),
@@ -120,8 +119,8 @@ def _pairs_of_plan(results: FlightResults) -> tuple[tuple[str, Cell], ...]:
 
 
 def _duration(results: FlightResults) -> tuple[str, str]:
-    has_hours = is_number(results.duration_s) and results.duration_s >= HOUR_S
-    return "Duration", f"{clock(results.duration_s)} {'h:min:s' if has_hours else 'min:s'}"
+    told = duration(results.duration_s)
+    return "Duration", told if ":" not in told else f"{told} {'h:min:s' if told.count(':') > 1 else 'min:s'}"
 
 
 def _counts(results: FlightResults) -> str:

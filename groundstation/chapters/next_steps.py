@@ -12,6 +12,7 @@ from groundstation.chapters.chapter import Advice, Chapters, Remedies
 from groundstation.chapters.held_signals import without_held
 from groundstation.chapters.parts import Facts, Section
 from groundstation.results.flight import FlightResults
+from groundstation.results.recorded import unnamed_buses
 
 TITLE = "What to do next"
 LEAD = ""
@@ -30,6 +31,7 @@ BY_REASON_OF_AN_INS: Remedies = (
     ("no INS heading", ("Record", "INS heading")),
 )
 LOST = "the recorder: data were lost"
+UNNAMED = "the buses with an ICD (`run --icd FILE`; `info --suggest-icd` drafts one)"
 
 
 def next_steps(results: FlightResults, chapters: Chapters) -> Section | None:
@@ -65,6 +67,11 @@ def _told(texts: dict[str, list[str]]) -> str:
 
 def _advice(results: FlightResults, chapters: Chapters) -> Iterator[Advice]:
     """Yield the advice, the most pressing first."""
+    if unnamed_buses(results.ledger):  # nobody knows what they lack
+        yield Advice("Check", UNNAMED, "")
+        if results.status != "ok":
+            yield Advice("Check", LOST, "")
+        return
     given = [advice for one in chapters.advisers for advice in one.advise(results)]
     yield from (advice for advice in given if advice.is_danger)
     yield from (advice for advice in given if advice.is_pressing and not advice.is_danger)

@@ -28,7 +28,7 @@ def _vehicle(results: FlightResults) -> str:
     kind, why = (results.metadata.get(key, "") for key in (KIND_OF_VEHICLE, WHY_THAT_VEHICLE))
     if not kind:
         return ""
-    told = f"Kind of vehicle: {'not known' if kind == 'unknown' else kind} ({clean(why)})."
+    told = f"Kind of vehicle: {'not known' if kind == 'unknown' else f'one that {kind}'} ({clean(why)})."
     phases = results.rows_of(PhaseSpans)
     share = 0.0 if phases is None else phases.likely_share()
     if share < LEAST_SHARE:

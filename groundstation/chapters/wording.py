@@ -8,7 +8,7 @@ from typing import Any, TypeGuard
 from groundstation.base.printable import printable
 from groundstation.base.unit_names import UNITS, split_unit
 from groundstation.base.units import M_PER_FOOT
-from groundstation.base.words import capitalised, clock_text
+from groundstation.base.words import capitalised, clock_text, length_text
 
 ABSENT = "—"
 MINUS = "−"
@@ -134,6 +134,17 @@ def clock(seconds: Any) -> str:
     if not is_number(seconds):
         return ABSENT
     return (MINUS if seconds < 0 and round(abs(seconds)) else "") + clock_text(seconds)
+
+
+def duration(seconds: Any) -> str:
+    """Return the length of a log, to the millisecond where it is short.
+
+    Examples
+    --------
+    >>> duration(0.654), duration(75.4), duration(None)
+    ('0.654 s', '1:15', '—')
+    """
+    return length_text(seconds) if is_number(seconds) else ABSENT
 
 
 def typeset(text: str) -> str:

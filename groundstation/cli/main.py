@@ -342,6 +342,7 @@ def list_(
         bool, typer.Option("--settings", help="List every setting instead: unit, default, range, meaning.")
     ] = False,
     profile: Profile = None,
+    icd: IcdFiles = None,
     json: Json = False,
     verbose: Verbose = False,
 ) -> int | None:
@@ -359,7 +360,7 @@ def list_(
         return DONE
     from groundstation.pipeline.verbs.catalogue import catalogue
 
-    entries = catalogue(log, profile)
+    entries = catalogue(log, profile, tuple(icd or ()))
     tell(printing.as_json(entries) if json else printing.catalogue(entries, log is not None))
     return DONE
 

@@ -6,6 +6,7 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 from groundstation.base.text_columns import columns
+from groundstation.base.words import IN_MS_BELOW_S
 from groundstation.cli.lines import Lines
 from groundstation.cli.text import as_json, printable, say, tell
 from groundstation.pipeline.one_flight.outcome import Outcome, State, worst_code
@@ -28,7 +29,7 @@ def description(what: "Description", *, everything: bool = False) -> str:
         rows = [["topic", "rows", "rate Hz", "span s", "fields"]]
         for topic in what.topics:
             rate = "" if topic.rate_hz is None else f"{topic.rate_hz:.6g}"
-            span = "" if topic.span_s is None else f"{topic.span_s:.1f}"
+            span = "" if topic.span_s is None else f"{topic.span_s:.{3 if topic.span_s < IN_MS_BELOW_S else 1}f}"
             rows.append(
                 [
                     printable(topic.name),
@@ -198,6 +199,7 @@ def _plain(outcome: Outcome) -> dict[str, Any]:
 
 
 KINDS = {
+    "note": "note",
     "analysis": "analyses",
     "format": "formats",
     "scenario": "scenarios",

@@ -17,6 +17,7 @@ from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatc
 from groundstation.base.timescales import WEEK_NS, gps_week_to_utc_ns, iso_to_utc_ns, whole_weeks
 from groundstation.base.toml_settings import number, required_number
 from groundstation.base.units import NS_PER_S
+from groundstation.base.words import counted
 from groundstation.integrity.clock import FIRST_NS, LARGEST_NS, ClockModel
 from groundstation.integrity.clock_fit import Fitted, fit_relation
 from groundstation.integrity.clock_relation import (
@@ -204,7 +205,8 @@ def _relation(readings: _Readings, clock: ClockModel, settings: RelationSettings
         prompt = _prompt(own_ns - told_ns)
         own_ns, told_ns = own_ns[prompt], told_ns[prompt]
     if len(own_ns) < settings.fewest_samples:
-        return ClockRelation(reference.clock, source, samples=len(own_ns), reason=f"{len(own_ns)} readings are too few")
+        too_few = f"{counted(len(own_ns), 'reading')} {'is' if len(own_ns) == 1 else 'are'} too few"
+        return ClockRelation(reference.clock, source, samples=len(own_ns), reason=too_few)
     if reference.scale == "day":
         told_ns = _unfolded(told_ns, own_ns)
     is_aside, aside = _other_weeks(own_ns, told_ns, clock.is_absolute)

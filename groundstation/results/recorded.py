@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Mapping
 
 from groundstation.base.ledger import Ledger, TopicEntry
-from groundstation.base.signals import RAW_PREFIX, is_canonical, kind_of
-from groundstation.base.words import clock_text, counted, listed
+from groundstation.base.signals import BUS_PREFIX, HOW_TO_NAME, RAW_PREFIX, is_canonical, kind_of
+from groundstation.base.words import IN_MS_BELOW_S, clock_text, counted, length_text, listed
 from groundstation.results.flight import SIMULATED_BY, FlightResults
 from groundstation.results.roles import WordsOfRecord
 
@@ -29,6 +29,7 @@ HEADINGS = frozenset(("true_heading_deg", "magnetic_heading_deg"))
 MOVES = frozenset(("latitude_deg", "velocity_north_mps", "north_m", "position_north_m"))
 HOUR_S = 3600
 FEW_S = 120.0  # below it a length is told in seconds
+MOST_OF_IT = 0.95  # of a log: signals that last as long are as long as the log
 GREAT_LOSS = 0.05  # share of the time of GNSS or INS, from which a loss is what a report opens with
 
 
@@ -58,11 +59,16 @@ def contents(results: FlightResults) -> str:
     if not kinds:
         return _raw(results)
     length = max((one.span_s for name, one in ledger.topics.items() if is_canonical(name)), default=0.0)
-    length = max(length - _paused_s(ledger), 0.0)
+    paused_s = _paused_s(ledger)
+    length = max(length - paused_s, 0.0)
     shown = ", ".join(_by_rate(kinds[:MOST_NAMED]))
     more = len(kinds) - MOST_NAMED
     also = f", beside {more} more" if more > 0 else ""
-    return f"{_length(length)} of {shown}{also}" if length else f"{shown}{also}"
+    if not length:
+        return f"{shown}{also}"
+    whole_s = results.duration_s - paused_s
+    part = f" in a log of {_of_log(whole_s)}" if length < MOST_OF_IT * whole_s else ""
+    return f"{_of_log(length)} of {shown}{also}{part}"
 
 
 def words(results: FlightResults) -> Mapping[str, str]:
@@ -111,11 +117,17 @@ def _kind(ledger: Ledger, kind: str, told: str) -> tuple[str, str] | None:
     topics = {name: one for name, one in ledger.topics.items() if kind_of(name) == kind and _present(one)}
     if not topics:
         return None
-    first = next(iter(topics.values()))
     name = NAMES[kind] if kind != "ins" else _of_ins(topics.values())
     several = f"{len(topics)} x {name}" if len(topics) > 1 else name
-    rate = first.nominal_rate_hz
-    return f"{several} ({told})" if told else several, f"at {_hertz(rate)} Hz" if rate else counted(first.rows, "row")
+    rates = sorted(rate for one in topics.values() if (rate := _rate(one)))
+    ends = list(dict.fromkeys(_hertz(rate) for rate in (rates[:1] + rates[-1:])))
+    rate = f"at {' to '.join(ends)} Hz" if rates else counted(sum(one.rows for one in topics.values()), "row")
+    return f"{several} ({told})" if told else several, rate
+
+
+def _rate(topic: TopicEntry) -> float | None:
+    """Return the rate of a topic: as it was logged, of one with gaps as it was between them."""
+    return topic.nominal_rate_hz if topic.gaps.count or not topic.nominal_rate_hz else topic.actual_rate_hz
 
 
 def _by_rate(kinds: list[tuple[str, str]]) -> list[str]:
@@ -147,8 +159,18 @@ def _present(topic: TopicEntry) -> tuple[str, ...]:
     return tuple(name for name, one in topic.fields.items() if one.present)
 
 
+def unnamed_buses(ledger: Ledger) -> int:
+    """Return the number of bus channels with words that no ICD names as signals; 0 where the log has signals."""
+    if any(is_canonical(name) and _present(one) for name, one in ledger.topics.items()):
+        return 0
+    return sum(name.startswith(BUS_PREFIX) and one.rows > 0 for name, one in ledger.topics.items())
+
+
 def _raw(results: FlightResults) -> str:
-    """Return the messages of a log without signals, those with most rows first."""
+    """Return the messages of a log without signals, those with most rows first; of buses, how to name them."""
+    length = f"{_of_log(results.duration_s)} of " if results.duration_s else ""
+    if count := unnamed_buses(results.ledger):
+        return f"{length}words of {counted(count, 'bus channel')} without ICD: {HOW_TO_NAME}"
     topics = sorted(
         ((name, one) for name, one in results.ledger.topics.items() if name.startswith(RAW_PREFIX)),
         key=lambda pair: -pair[1].rows,
@@ -158,7 +180,6 @@ def _raw(results: FlightResults) -> str:
     named = [f"{name.removeprefix(RAW_PREFIX)} ({one.rows})" for name, one in topics[:MOST_RAW]]
     more = len(topics) - len(named)
     shown = listed([*named, counted(more, "more kind")] if more > 0 else named)
-    length = f"{_length(results.duration_s)} of " if results.duration_s else ""
     return f"{length}messages without navigation: {shown}"
 
 
@@ -191,6 +212,11 @@ def _share(topic: TopicEntry) -> float:
 def _name(topic: str) -> str:
     kind = kind_of(topic)
     return NAMES.get(kind, kind) + topic.removeprefix(kind).replace(".", " ")
+
+
+def _of_log(seconds: float) -> str:
+    """Return the length of a log or of its signals, as its page tells it where it is short."""
+    return length_text(seconds) if 0.0 < seconds < IN_MS_BELOW_S else _length(seconds)
 
 
 def _length(seconds: float) -> str:

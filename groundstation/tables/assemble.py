@@ -67,7 +67,7 @@ def flight_from_batches(
     """
     first: dict[str, RecordBatch] = {}
     growing: dict[str, GrowingTable] = {}
-    starts_ns: list[int] = []
+    starts_ns, ends_ns = list[int](), list[int]()
     for batch in batches:
         if batch.time_ns is None:
             raise GroundstationError(
@@ -77,6 +77,7 @@ def flight_from_batches(
             continue
         if not has_values(batch.topic):
             starts_ns.append(int(batch.time_ns.min()))
+            ends_ns.append(int(batch.time_ns.max()))
         elif batch.topic not in first:
             first[batch.topic] = batch  # most topics have one alone: its arrays are the table's
         else:
@@ -91,7 +92,7 @@ def flight_from_batches(
     start_ns = min((*(int(table.time_ns[0]) for table in tables.values()), *starts_ns), default=0)
     ends_s = ((one.start_s, one.start_s + one.length_s) for one in pauses)
     paused = (Pause(*(start_ns + round(end_s * NS_PER_S) for end_s in ends)) for ends in ends_s)
-    return Flight(tables, metadata, start_ns, has_utc, source_name, tuple(paused))
+    return Flight(tables, metadata, start_ns, has_utc, source_name, tuple(paused), max(ends_ns, default=None))
 
 
 def batches_from_flight(flight: Flight, max_rows: int = MAX_BATCH_ROWS) -> Iterator[RecordBatch]:

@@ -17,6 +17,9 @@ LARGEST_GAP_S = 2.5  # bridges 1 Hz logs with one lost second, nothing more
 LONGEST_GRID = 2_000_000  # 4.6 days, 0.6 GB: a clock that jumps must not fill the memory
 FEWEST_SATELLITES = 4
 FROZEN_S, FROZEN_SPEED_MPS = 60.0, 20.0
+# By any of these fields an instance is the one that gives the quantity.
+SPEED, PLACE, ATTITUDE = ("velocity_north_mps", "ground_speed_mps"), ("latitude_deg",), ("roll_deg",)
+ALTITUDE, CLIMB = ("altitude_msl_m", "altitude_ellipsoid_m", "pressure_altitude_m"), ("velocity_down_mps",)
 ROWS_AT_ONCE = 1 << 18  # of a table: working arrays do not grow with a log
 Values = Callable[[Table], FloatArray]  # of the rows of a part of a table
 
@@ -87,34 +90,40 @@ def motion_of(flight: Flight) -> Motion:
     It takes means of the samples around each grid time, and straight lines in between.
     """
     size = grid_size(flight)
-    ins, gnss = first_of_kind(flight, "ins"), first_of_kind(flight, "gnss")
-    speed = on_grid(flight, gnss, _usable_speed_mps, size)
-    speed = np.where(np.isfinite(speed), speed, on_grid(flight, ins, horizontal_speed_mps, size))
+    ins = first_of_kind(flight, "ins", *ATTITUDE)
+    fast, fast_gnss = (first_of_kind(flight, kind, *SPEED) for kind in ("ins", "gnss"))
+    high, high_gnss = (first_of_kind(flight, kind, *ALTITUDE) for kind in ("ins", "gnss"))
+    rising = (first_of_kind(flight, kind, *CLIMB) for kind in ("ins", "gnss"))
+    speed = on_grid(flight, fast_gnss, _usable_speed_mps, size)
+    speed = np.where(np.isfinite(speed), speed, on_grid(flight, fast, horizontal_speed_mps, size))
     true_heading, magnetic = ins.values("true_heading_deg"), ins.values("magnetic_heading_deg")
     heading = true_heading if np.isfinite(true_heading).any() else magnetic
-    north, east = _positions(flight, gnss, ins, size)
+    placed = (first_of_kind(flight, kind, *PLACE) for kind in ("gnss", "ins"))
+    north, east = _positions(flight, *placed, size)
     moving = np.nan_to_num(speed, nan=0.0)
     return Motion(
         speed,
         on_grid(flight, ins, unwrap(ins.values("roll_deg")), size),
         on_grid(flight, ins, ins.values("pitch_deg"), size),
         on_grid(flight, ins, unwrap(heading), size),
-        np.array([_altitude(flight, table, speed) for table in (ins, gnss)]),
+        np.array([_altitude(flight, table, speed) for table in (high, high_gnss)]),
         _altitude(flight, first_of_kind(flight, "baro"), speed),
-        np.array([on_grid(flight, table, _climb_mps, size) for table in (ins, gnss)]).reshape(2, size),
+        np.array([on_grid(flight, table, _climb_mps, size) for table in rising]).reshape(2, size),
         north,
         east,
         np.concatenate([[0.0], np.cumsum(0.5 * (moving[1:] + moving[:-1]))])[:size] / RATE_HZ,
     )
 
 
-def first_of_kind(flight: Flight, kind: str) -> Table:
+def first_of_kind(flight: Flight, kind: str, *names: str) -> Table:
     """Return the first instance of a topic, in order of preference, that has samples.
 
-    The table is empty when there is none.
+    It is the first with any of the named fields, where one has them: an INS that gives a heading alone stands before
+    one with velocities. The table is empty when there is none.
     """
-    topics = [topic for topic in sources_of_kind(flight, kind) if len(flight[topic])]
-    return flight[topics[0]] if topics else Table.empty(kind)
+    tables = [flight[topic] for topic in sources_of_kind(flight, kind) if len(flight[topic])]
+    first = tables[0] if tables else Table.empty(kind)
+    return next((table for table in tables if any(table.has(name) for name in names)), first)
 
 
 def horizontal_speed_mps(table: Table) -> FloatArray:
@@ -214,7 +223,7 @@ def _positions(flight: Flight, gnss: Table, ins: Table, size: int) -> tuple[Floa
 
 
 def _altitude(flight: Flight, table: Table, speed_mps: FloatArray) -> FloatArray:
-    for name in ("altitude_msl_m", "altitude_ellipsoid_m", "pressure_altitude_m"):
+    for name in ALTITUDE:
         values = table.values(name)
         if np.isfinite(values).any():
             altitude_m = on_grid(flight, table, values, len(speed_mps))

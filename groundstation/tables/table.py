@@ -314,6 +314,8 @@ class Flight:
         Name of the log file, without folders.
     pauses : tuple of Pause
         Times in which nothing was logged, as the vehicle was disarmed, in order.
+    end_ns : int, optional
+        Corrected time of the last record that has no table: words and bytes as recorded.
     """
 
     tables: Mapping[str, Table]
@@ -322,6 +324,7 @@ class Flight:
     has_utc: bool = False
     source_name: str = ""
     pauses: tuple[Pause, ...] = ()
+    end_ns: int | None = None
     _made: dict[Hashable, Any] = field(default_factory=dict, init=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -364,8 +367,9 @@ class Flight:
 
     @property
     def duration_s(self) -> float:
-        """Seconds from the first to the last sample of any topic."""
+        """Seconds from the first to the last record of any topic."""
         ends = [int(table.time_ns[-1]) for table in self.tables.values() if len(table)]
+        ends += [] if self.end_ns is None else [self.end_ns]
         return (max(ends) - self.start_ns) / NS_PER_S if ends else 0.0
 
 

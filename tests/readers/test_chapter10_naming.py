@@ -10,6 +10,7 @@ from groundstation.base.geodesy import north_east_m
 from groundstation.base.records import Damage, Item, RecordBatch, Remark
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import open_log
+from groundstation.pipeline.verbs.catalogue import catalogue
 from groundstation.pipeline.verbs.describe import describe, suggest_icd
 from groundstation.readers import registry
 from groundstation.readers.chapter10.bus_words import TIME_OUT
@@ -224,7 +225,12 @@ def test_an_icd_applied_to_the_mcap_gives_what_it_gives_of_the_log(tmp_path: Pat
     assert canonical(again) == canonical(named)
     convert_log(open_log(named, icds=("b100",)), other)
     assert canonical(other) == {}, "signals that the other ICD gave are gone"
+    before, after = catalogue(plain), catalogue(plain, icds=(icd,))
+    assert before[0]["kind"] == "note" and "`--icd FILE` names them" in before[0]["title"]
+    assert all(one["kind"] == "analysis" for one in after)
+    assert any("without ICD: `--icd FILE` names them" in one.text for one in describe(plain).findings)
     told = describe(plain, icds=(icd,))
+    assert not any("without ICD" in one.text for one in told.findings)
     assert [(one.place, one.what, one.names) for one in told.buses] == [("4", "RT 6 T SA 29", ("ATTITUDE",))]
 
 

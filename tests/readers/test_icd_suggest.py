@@ -81,6 +81,16 @@ def test_a_receiver_that_stands_at_zero_is_none(tmp_path: Path) -> None:
     assert signals(read_back(tmp_path, *entries)) == set()
 
 
+@pytest.mark.parametrize(("seen_g", "factor_mps2"), [(-1.0, 9.80665), (1.0, -9.80665), (0.0, -9.80665)])
+def test_a_normal_acceleration_has_the_sign_that_one_g_gives_it(
+    tmp_path: Path, seen_g: float, factor_mps2: float
+) -> None:
+    """One unit of a real aircraft sent -1 g at rest and another +1 g: both were drafted with sign -1."""
+    found = read_back(tmp_path, *INERTIAL, label("normal_acceleration", seen_g))
+    (element,) = (one for _, one in found.elements() if one.signal == "ins.accel_z_mps2")
+    assert element.factor == pytest.approx(factor_mps2), "specific force down at rest is -1 g"
+
+
 def test_two_buses_are_two_units(tmp_path: Path) -> None:
     found = read_back(
         tmp_path, *INERTIAL, label("true_heading", 121.0, sub_channel=2), label("roll", 2.0, sub_channel=2)
@@ -164,6 +174,8 @@ def test_the_inertial_systems_of_a_parked_tanker_are_found(tmp_path: Path) -> No
         for word in found.words_429
         if word.label == 0o314 and word.elements[0].signal
     }
+    signs = [np.sign(one.factor) for _, one in found.elements() if (one.signal or "").endswith("accel_z_mps2")]
+    assert signs == [1.0, 1.0, -1.0, -1.0], "-1 g on two buses and +1 g on two"
     assert headings[6, 5].startswith("-120.76")
     assert headings[6, 6].startswith("-120.36")
     assert not [signal for signal in signals(found) if signal.startswith("gnss")]

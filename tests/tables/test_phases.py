@@ -449,6 +449,26 @@ def test_without_what_it_needs_nothing_is_proven_and_the_reason_is_given(topic: 
     assert phases.phase.tolist() == ["unknown"]
 
 
+def test_each_quantity_is_that_of_the_first_ins_that_has_it() -> None:
+    """An INS with a heading alone came first on the buses of a real aircraft: "no ground speed in the log"."""
+    flight = flight_of(light_aircraft(), rates_hz=(5.0, 5.0))
+    whole = replace(flight["ins"], columns={**flight["gnss"].columns, **flight["ins"].columns})
+    attitude = ("roll_deg", "pitch_deg", "true_heading_deg")
+    split = {
+        "ins.1": ("true_heading_deg",),
+        "ins.2": attitude,
+        "ins.3": tuple(name for name in whole.columns if name not in attitude),
+    }
+    tables = {
+        topic: replace(whole, topic=topic, columns={name: whole.columns[name] for name in names})
+        for topic, names in split.items()
+    }
+    one, several = (motion_of(replace(flight, tables=tables)) for tables in ({"ins": whole}, tables))
+    for name in ("speed_mps", "roll_deg", "pitch_deg", "heading_deg", "north_m", "climb_mps", "all_altitudes_m"):
+        assert np.isfinite(getattr(one, name)).any(), name
+        np.testing.assert_array_equal(getattr(several, name), getattr(one, name), err_msg=name)
+
+
 def test_nan_everywhere_one_sample_and_no_sample() -> None:
     truth = light_aircraft()
     flight = flight_of(truth)

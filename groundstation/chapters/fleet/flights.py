@@ -11,7 +11,7 @@ from groundstation.chapters.fleet.common import aircraft_name, bounded, minute, 
 from groundstation.chapters.fleet.reasons import reasons_of
 from groundstation.chapters.gates import VERDICTS
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Section, Tone, kept
-from groundstation.chapters.wording import ABSENT, clean, clock, number, plural
+from groundstation.chapters.wording import ABSENT, clean, duration, number, plural
 from groundstation.results.fleet import FleetResults
 
 KEY = "flights"
@@ -162,7 +162,7 @@ COLUMNS = (
         "radial_error_rate_fit_nmiph",
     ),
     Column(Head("60 min, m", True), lambda row: bounded(row["forecast_60min_rms_m"], 0), "forecast_60min_rms_m"),
-    Column(Head("Duration", True), lambda row: clock(row["duration_s"]), "duration_s"),
+    Column(Head("Duration", True), lambda row: duration(row["duration_s"]), "duration_s"),
     Column(Head("Approaches"), _approaches, "landing_approaches"),
     Column(Head("Health"), _graded("health_verdict", GRADES), "health_verdict"),
     Column(Head("Trajectory"), _graded("trajectory_state", STATES), "trajectory_state"),

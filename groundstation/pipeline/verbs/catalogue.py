@@ -4,16 +4,20 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from groundstation.base.ledger import Ledger
+from groundstation.base.signals import HOW_TO_NAME
+from groundstation.base.words import counted
 from groundstation.pipeline.many_flights.inputs import file_in, is_session
 from groundstation.results.file_names import SUMMARY
 from groundstation.results.files import load_document
+from groundstation.results.recorded import unnamed_buses
 from groundstation.systems import systems
 
 
-def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict[str, Any]]:
+def catalogue(log: Path | None = None, profile: Path | None = None, icds: tuple[str, ...] = ()) -> list[dict[str, Any]]:
     """List analyses, formats, scenarios and studies.
 
-    With a log, tell whether each analysis would run on it and why not.
+    With a log, tell whether each analysis would run on it and why not; ``icds`` name the words of its buses.
 
     Raises
     ------
@@ -35,7 +39,7 @@ def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict
             *_failures(),
         ]
     folder = log.parent if log.name == SUMMARY else log
-    return _of_a_session(folder) if is_session(folder) else _with_answers(log, profile)
+    return _of_a_session(folder) if is_session(folder) else _with_answers(log, profile, icds)
 
 
 def _analyses() -> list[dict[str, Any]]:
@@ -62,7 +66,7 @@ def _of_a_session(folder: Path) -> list[dict[str, Any]]:
     ]
 
 
-def _with_answers(path: Path, profile: Path | None) -> list[dict[str, Any]]:
+def _with_answers(path: Path, profile: Path | None, icds: tuple[str, ...]) -> list[dict[str, Any]]:
     """Return the analyses, each with whether it would run on a log and why not."""
     from groundstation.base.errors import UsageError
     from groundstation.pipeline.one_flight.analyse import answers_of
@@ -76,13 +80,24 @@ def _with_answers(path: Path, profile: Path | None) -> list[dict[str, Any]]:
     path = file_in(path, ".mcap") if path.is_dir() else path
     with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
         mcap = Path(folder) / "flight.mcap"
-        flight = read_flight(mcap, convert_log(open_log(path, profile), mcap))
+        converted = convert_log(open_log(path, profile, icds), mcap)
+        flight = read_flight(mcap, converted)
     found, _known = answers_of(flight, Configuration())
     return [
-        {**entry, "would_run": entry["name"] in found.answers, "reason": found.reasons.get(entry["name"], "")}
-        for entry in _analyses()
-        if entry["name"] in {*found.answers, *found.reasons}  # what does not apply to such a log is left out
+        *_unnamed(converted.info.ledger),
+        *(
+            {**entry, "would_run": entry["name"] in found.answers, "reason": found.reasons.get(entry["name"], "")}
+            for entry in _analyses()
+            if entry["name"] in {*found.answers, *found.reasons}  # what does not apply to such a log is left out
+        ),
     ]
+
+
+def _unnamed(ledger: Ledger) -> list[dict[str, Any]]:
+    """Return what to do about bus words that no ICD names; nothing where there are none."""
+    count = unnamed_buses(ledger)
+    title = f"words of {counted(count, 'bus channel')} without ICD: {HOW_TO_NAME}"
+    return [{"kind": "note", "name": "buses", "title": title, "needs": "nothing"}] if count else []
 
 
 def _formats() -> list[dict[str, Any]]:

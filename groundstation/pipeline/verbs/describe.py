@@ -10,6 +10,8 @@ from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.base.signals import BUS_PREFIX
+from groundstation.base.units import NS_PER_S
+from groundstation.base.words import length_text
 from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.log import Log, as_log, open_log, open_one_of_several
 from groundstation.pipeline.one_flight.segments import PowerUpTold, segments_in, segments_of, told_of
@@ -109,7 +111,8 @@ def _recorded(log: Log) -> Description:
             buses.add(item)
         if isinstance(item, RecordBatch):
             fields.setdefault(item.topic, {}).update(dict.fromkeys(item.columns))
-    facts = facts_of(log, dict(found.header.metadata), ledger)
+    ends_ns = [found.ledger.start_ns, *(topic.last_ns for topic in found.ledger.topics)]
+    facts = facts_of(log, dict(found.header.metadata), ledger, (max(ends_ns) - ends_ns[0]) / NS_PER_S)
     lost = any(damage.loses_data for damage in found.damages)
     topics, findings = _topics(ledger, fields), ledger_findings(found.ledger)
     power_ups = told_of(segments_of(found.power_ups), found.clock.is_absolute)
@@ -174,15 +177,17 @@ def _stored(log: Log) -> Description:
 
     info = read_info(log.path)
     fields: dict[str, dict[str, None]] = {}
-    damages, buses = [], _bus_contents(info.ledger)
+    damages, buses, ends_ns = [], _bus_contents(info.ledger), list[int]()
     for item in log.items():
         if buses is not None:
             buses.add(item)
         if isinstance(item, RecordBatch):
             fields.setdefault(item.topic, {}).update(dict.fromkeys(item.columns))
+            ends_ns += [] if item.time_ns is None or not len(item) else [item.time_ns.min(), item.time_ns.max()]
         elif isinstance(item, Damage):
             damages.append(item)
-    facts = facts_of(log, dict(info.metadata), info.ledger)
+    length_s = float(max(ends_ns) - min(ends_ns)) / NS_PER_S if ends_ns else None
+    facts = facts_of(log, dict(info.metadata), info.ledger, length_s)
     facts["log"] = f"{info.source_name}, read as {info.reader}"
     findings = (*info.findings, *(damage_finding(damage) for damage in damages))
     lost, topics = _has_lost(info, damages), _topics(info.ledger, fields)
@@ -195,10 +200,10 @@ def _has_lost(info: StoreInfo, damages: list[Damage]) -> bool:
     return any(entry.get("loses_data") for entry in info.damages) or any(damage.loses_data for damage in damages)
 
 
-def facts_of(log: Log, metadata: Mapping[str, str], ledger: Ledger) -> dict[str, str]:
+def facts_of(log: Log, metadata: Mapping[str, str], ledger: Ledger, length_s: float | None = None) -> dict[str, str]:
     """Return facts of a log, name to text.
 
-    File, size, format, first and last sample, metadata.
+    File, size, format, first and last sample, metadata; ``length_s``, where given, is from the first to the last.
     """
     facts = {
         "file": log.source.name,
@@ -211,6 +216,8 @@ def facts_of(log: Log, metadata: Mapping[str, str], ledger: Ledger) -> dict[str,
         # Texts of one clock sort as their times do: ISO UTC, or +mm:ss padded by what has the most digits.
         facts["first sample"] = min((topic.first for topic in topics), key=lambda text: (len(text), text))
         facts["last sample"] = max((topic.last for topic in topics), key=lambda text: (len(text), text))
+        if length_s is not None:
+            facts["duration"] = length_text(length_s)
     return {**facts, **{key: metadata[key] for key in sorted(metadata)}}
 
 

@@ -33,7 +33,8 @@ from groundstation.readers.icd.model import REVERSED_BYTE
 from groundstation.readers.places import nowhere, placed
 
 # Codes of the remarks that naming makes.
-NAMING_CODES = ("icd", "icd_of_another", "mapped", "several_units", "derived", "bus_errors", "not_used")
+NO_ICD = "no_icd"
+NAMING_CODES = ("icd", "icd_of_another", "mapped", "several_units", "derived", "bus_errors", "not_used", NO_ICD)
 _SIX_AXES = (*imu.RATES, *imu.ACCELERATIONS)
 TRANSMITS = 0x400
 WRONG_WORD = 6  # flags of a 429 word: format or parity error seen by the recorder

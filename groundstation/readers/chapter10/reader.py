@@ -5,10 +5,12 @@ Channels are read block by block.
 
 from collections.abc import Iterator, Sequence
 
-from groundstation.base.records import Damage, Item, LogHeader, RecordBatch
+from groundstation.base.records import Damage, Item, LogHeader, RecordBatch, Remark
+from groundstation.base.signals import BUS_PREFIX, HOW_TO_NAME
+from groundstation.base.words import counted
 from groundstation.readers.chapter10.bus_words import bounded, messages_1553, words_429
 from groundstation.readers.chapter10.kinds import ARINC_429, EVENT, MIL_STD_1553
-from groundstation.readers.chapter10.naming import named
+from groundstation.readers.chapter10.naming import NO_ICD, named
 from groundstation.readers.chapter10.overview import RecordingOverview, overview
 from groundstation.readers.chapter10.packets import PacketBlock, PacketWalk
 from groundstation.readers.chapter10.payloads import batch_of
@@ -32,19 +34,23 @@ def items(source: Source, icds: Sequence[Icd] = ()) -> Iterator[Item]:
     Each batch of bus words is followed by the signals that ``icds`` find in it.
     """
     found = overview(source, with_buses=bool(icds))
-    told = _recorded(source, found)
+    told = _recorded(source, found, is_named=bool(icds))
     return named(told, icds, found.seen) if icds else told
 
 
-def _recorded(source: Source, found: RecordingOverview) -> Iterator[Item]:
+def _recorded(source: Source, found: RecordingOverview, *, is_named: bool) -> Iterator[Item]:
     start = start_of(found.readings, found.dates, found.tmats)
     facts = metadata(found.tmats)
     yield LogHeader(READER, facts, start.utc_of_zero_ns, has_counting_clock=True, utc_readings=start.readings)
-    walk, lost = PacketWalk(source), dict[str, int]()
+    walk, lost, buses = PacketWalk(source), dict[str, int](), dict[str, None]()
     for block in walk:
         for batch in _batches(block, found.tmats, lost):
+            if batch.topic.startswith(BUS_PREFIX):
+                buses[batch.topic] = None
             yield from bounded(batch)
     yield from start.remarks
+    if buses and not is_named:
+        yield Remark(NO_ICD, f"words of {counted(len(buses), 'bus channel')} without ICD: {HOW_TO_NAME}")
     yield from walk.tally.remarks(found.tmats)
     yield from walk.damages()
     for topic, count in lost.items():

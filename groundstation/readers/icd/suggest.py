@@ -29,6 +29,7 @@ _TELLING = {
     "arinc429_air_data": (0o203, 0o206, 0o210),
 }
 _POSITIONS = ((0o310, 0o311), (0o110, 0o111))  # latitude, longitude: only both are a position
+DOWNWARD, HALF_A_G_MPS2 = "accel_z_mps2", 4.9
 HEAD = (
     "A start: what is on the buses. Equipment is guessed by what it sends together: check every name with its maker.",
     "Words without a known name are counts (msbval: 0); desc has the range seen, and of labels the sign/status matrix.",
@@ -124,6 +125,7 @@ def _words(on_bus: Sequence[BusEntry], units: _Units) -> Iterator[Word429]:
         found = _with_position({word.label: word for word in there if len(_usable(word, by_label))}, by_label)
         if len(found.keys() & set(telling)) >= NEEDED_LABELS:
             known |= {word.label: word for word in units.named(tuple(found.values()))}
+    known = {label: replace(word, elements=_upright(word, by_label[label])) for label, word in known.items()}
     for entry in on_bus:
         word = known.get(entry.key, Word429(f"label_{entry.key:03o}", entry.key, elements=(_count_429(entry),)))
         place = f"ch{entry.channel}_{entry.sub_channel}"
@@ -140,6 +142,22 @@ def _words(on_bus: Sequence[BusEntry], units: _Units) -> Iterator[Word429]:
             rate_hz=_rate(entry),
             elements=elements,
         )
+
+
+def _upright(word: Word429, entry: BusEntry) -> tuple[Element429, ...]:
+    """Return the elements of a word, a normal acceleration with the sign that its values have.
+
+    Units count it upwards or downwards, and an aircraft carries 1 g upwards at rest and most of the time: specific
+    force down is negative then. Values below half of that decide nothing.
+    """
+    elements = []
+    for one in word.elements:
+        if one.signal is not None and one.signal.endswith(f".{DOWNWARD}"):
+            values, usable = decode_429(entry.sample, one)
+            usual_mps2 = float(np.median(values[usable] * one.factor)) if usable.any() else 0.0
+            one = replace(one, factor=-one.factor) if usual_mps2 > HALF_A_G_MPS2 else one
+        elements.append(one)
+    return tuple(elements)
 
 
 def _usable(word: Word429, by_label: Mapping[int, BusEntry]) -> FloatArray:

@@ -10,7 +10,7 @@ from groundstation.chapters.gates import NOT_ASSESSABLE
 from groundstation.chapters.parts import Cell, Facts, Figure, Front, Grid, Head, Mark, Note, Part, Section
 from groundstation.chapters.wording import (
     any_value,
-    clock,
+    duration,
     is_number,
     named_quantity,
     names_or_count,
@@ -384,7 +384,11 @@ def _clock_rows(data: SessionClocks) -> list[tuple[str | Mark, ...]]:
 
 
 def _settings(answer: CooperativeResult) -> Facts:
-    pairs = [("frame", answer.frame, ""), ("duration", clock(answer.duration_s), ""), ("slots", str(answer.slots), "")]
+    pairs = [
+        ("frame", answer.frame, ""),
+        ("duration", duration(answer.duration_s), ""),
+        ("slots", str(answer.slots), ""),
+    ]
     for name, value in answer.settings.items():
         label, unit = named_quantity(name.replace(".", " "))
         pairs.append((label, any_value(value, unit), ""))

@@ -7,7 +7,7 @@ import numpy as np
 
 from groundstation.chapters.fleet.common import aircraft_name, minute
 from groundstation.chapters.parts import Cell, Grid, Head, Note, Section
-from groundstation.chapters.wording import ABSENT, clock, number
+from groundstation.chapters.wording import ABSENT, duration, number
 from groundstation.results.fleet import FleetResults, SessionRow
 from groundstation.systems.cooperative.chapter import state_of, title_of
 
@@ -36,7 +36,7 @@ def build(fleet: FleetResults) -> Section | None:
 
 def _cells(row: SessionRow) -> tuple[Cell, ...]:
     start = np.datetime64("NaT" if row.start_utc_ns is None else row.start_utc_ns, "ns")
-    head = (row.session_id, aircraft_name(row.aircraft, LONGEST_NAMES), minute(start), clock(row.duration_s))
+    head = (row.session_id, aircraft_name(row.aircraft, LONGEST_NAMES), minute(start), duration(row.duration_s))
     warnings = number(float(row.findings_warn + row.findings_fail), 0)
     if not row.algorithm:
         return (*head, row.reason or ABSENT, *[ABSENT] * 4, warnings)

@@ -20,6 +20,7 @@ from groundstation.systems.inertial.units_growth import Noise
 from groundstation.systems.inertial.units_heading import heading_faults
 from groundstation.systems.inertial.units_limits import limits_of, share_of_limits
 from groundstation.systems.inertial.units_prepare import Comparable, Prepared, prepare
+from groundstation.systems.inertial.units_short import WHY_NOT, differ_in_short, together_s
 from groundstation.systems.inertial.units_track import ReferenceTrack, UnitTrack
 from groundstation.systems.inertial.units_verdict import growth_faults, is_common, own_faults, sentence_of, size_of
 from groundstation.tables.sources import AIDED
@@ -52,7 +53,8 @@ def judge_units(
     Raises
     ------
     NotAssessableError
-        When there are fewer than two units with samples, or no two overlap.
+        When there are fewer than two units with samples, or no two overlap. Units that do so for less than
+        :data:`LEAST_S` are not judged: their differences are told.
 
     Notes
     -----
@@ -64,10 +66,15 @@ def judge_units(
     tracks = [one for one in units if len(one.time_s) > 1]
     if len(tracks) < 2:
         raise NotAssessableError("ins_units", f"{len(tracks)} INS with samples", "two or more")
-    together_s = _longest_together_s(tracks)
-    if together_s < LEAST_S:
-        raise NotAssessableError("ins_units", f"{together_s:.0f} s of two INS together", f"at least {LEAST_S:.0f} s")
     limits_class = _limits_class(ins_class)
+    class_origin = ins_class_origin if limits_class == ins_class else f"{ins_class} was not simulated"
+    longest_s = max(together_s(*pair) for pair in combinations(tracks, 2))
+    if longest_s < LEAST_S:
+        short = differ_in_short(tracks, ins_class=limits_class, ins_class_origin=class_origin, least_s=LEAST_S)
+        if short is None:
+            told = "no time" if longest_s < 0.0 else f"{longest_s:.2g} s"
+            raise NotAssessableError("ins_units", f"{told} of two INS together", f"at least {LEAST_S:.0f} s")
+        return short
     classes = {one.topic: _limits_class(one.ins_class) if one.ins_class else limits_class for one in tracks}
     found = prepare(tracks, reference)
     by_reference = against_reference(found, _noise(reference), classes)
@@ -91,7 +98,7 @@ def judge_units(
         against="" if reference is None else reference.topic,
         against_title="" if reference is None else reference.title,
         ins_class=limits_class,
-        ins_class_origin=ins_class_origin if limits_class == ins_class else f"{ins_class} was not simulated",
+        ins_class_origin=class_origin,
         false_alarm_share=share_of_limits(),
         figures=figures_of(found),
     )
@@ -100,13 +107,6 @@ def judge_units(
 def _limits_class(ins_class: str) -> str:
     """Return the class itself where it has limits."""
     return ins_class if limits_of(ins_class, 1.0, is_start_known=True) is not None else DEFAULT_LIMITS
-
-
-def _longest_together_s(tracks: Sequence[UnitTrack]) -> float:
-    return max(
-        float(min(one.time_s[-1], other.time_s[-1]) - max(one.time_s[0], other.time_s[0]))
-        for one, other in combinations(tracks, 2)
-    )
 
 
 def _noise(reference: ReferenceTrack | None) -> Noise:
@@ -210,4 +210,4 @@ def _why_not(first: Prepared, second: Prepared) -> str:
             return f"{one.topic} repeats {one.same_as}"
         if one.track.kind == AIDED:
             return f"GNSS corrects {one.topic}"
-    return "too little of both together"
+    return WHY_NOT

@@ -35,6 +35,7 @@ VERDICTS = {
     "one_of": "{}: one is off",
     "not_judged": "Not judged",
 }
+SHORT_H = 120.0 / 3600.0  # of less no units are judged: it is told in seconds
 
 
 def units(results: FlightResults) -> Section | None:
@@ -48,7 +49,7 @@ def units(results: FlightResults) -> Section | None:
         *_remarks(answer),
         _table(answer),
         _pairs(answer),
-        Figure("units.radial"),
+        Figure("units.radial") if any(pair.hours >= SHORT_H for pair in answer.pairs) else None,
     )
     return Section("ins_units", TITLE, LEAD, kept(parts), _headline(answer), claim=_claim(answer))
 
@@ -156,6 +157,12 @@ def _grid(title: str, columns: Sequence[tuple[Head, Callable[[Any], Cell]]], row
 
 
 def _pairs(answer: UnitsResult) -> Grid:
+    if all(pair.hours < SHORT_H for pair in answer.pairs):
+        caption = (
+            "Medians over the time of both, as logged. ± is what rounding and noise of both outputs do. In so short a "
+            "time nothing is judged, and clocks are not compared: in motion a late clock looks like a distance."
+        )
+        return _grid("Pairs", PAIR_COLUMNS, answer.pairs, caption)
     caption = (
         f"Limits: what two honest units of the {_classes(answer)} exceed in "
         f"{percent(answer.false_alarm_share, 1)} of simulated flights of this length, Schuler oscillation and all; "
@@ -185,10 +192,14 @@ def _pair_state(pair: InsPair) -> Cell:
     return Mark("warn", "Beyond") if pair.is_beyond else Mark("good", "Within")
 
 
+def _together(pair: InsPair) -> Cell:
+    return f"{pair.hours * 3600.0:.2g} s" if pair.hours < SHORT_H else f"{number(pair.hours, 2)} h"
+
+
 PAIR_COLUMNS: tuple[tuple[Head, Callable[[InsPair], Cell]], ...] = (
     (Head("Pair"), lambda pair: f"{pair.second} − {pair.first}"),
     (Head(""), _pair_state),
-    (Head("Hours", True), lambda pair: number(pair.hours, 2)),
+    (Head("Together", True), _together),
     (Head("Rate, nmi/h", True), _pair_rate),
     (Head("Limit", True), lambda pair: number(pair.rate_limit_nmiph, 2)),
     (Head("Velocity RMS, m/s", True), lambda pair: _measured(pair.velocity_rms_mps, 2)),

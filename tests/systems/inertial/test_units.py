@@ -249,11 +249,47 @@ def test_too_little_is_a_reason() -> None:
     with pytest.raises(NotAssessableError, match="1 INS with samples"):
         judge_units(made[:1])
     short = [replace(one, **{name: getattr(one, name)[:60] for name in _ROWS}) for one in made]
-    with pytest.raises(NotAssessableError, match="59 s of two INS together, expected at least 120 s"):
-        judge_units(short, gnss())
+    assert judge_units(short, gnss()).verdict == "not_judged"
     apart = [made[0], replace(made[1], time_s=made[1].time_s + 1e5)]
-    with pytest.raises(NotAssessableError, match="together"):
+    with pytest.raises(NotAssessableError, match="no time of two INS together, expected at least 120 s"):
         judge_units(apart, None)
+
+
+def test_units_of_a_short_log_are_not_judged_but_their_differences_are_told() -> None:
+    """A parked aircraft, 0.25 s: the chapter said "found 0 s of two INS together" of units 100 m apart."""
+    time_s = np.linspace(0.0, 0.25, 14)
+    north = replace(
+        units(1)[0],
+        topic="ins.1",
+        time_s=time_s,
+        latitude_deg=np.full(14, 50.0),
+        longitude_deg=np.full(14, 180.0),
+        velocity_mps=np.zeros((14, 2)),
+        heading_deg=np.full(14, 359.9),
+    )
+    later = time_s[3:9:5] + 0.004  # two samples: ten a second
+    other = replace(
+        north,
+        topic="ins.2",
+        time_s=later,
+        latitude_deg=np.full(2, 50.0 + 105.0 / 111_229.0),  # metres of a degree of latitude there
+        longitude_deg=np.full(2, -180.0),
+        velocity_mps=np.zeros((2, 2)),
+        heading_deg=np.array([0.3, 0.3]),
+    )
+    found = judge_units((north, other))
+    assert (found.verdict, found.off, found.faults) == ("not_judged", (), ())
+    (pair,) = found.pairs
+    assert pair.heading_difference_deg is not None and pair.heading_difference_deg.value == pytest.approx(0.4)
+    assert pair.largest_m is not None and pair.largest_m.value == pytest.approx(105.0, abs=0.1)
+    assert pair.hours * 3600.0 == pytest.approx(later[1] - later[0])
+    assert found.sentence == (
+        "headings of ins.1 and ins.2 0.40 deg apart and positions of ins.1 and ins.2 105 m apart over 0.096 s "
+        "together: at least 120 s are needed to judge them"
+    )
+    bare = replace(other, heading_deg=None, latitude_deg=np.full(2, np.nan))
+    with pytest.raises(NotAssessableError, match=r"found 0\.096 s of two INS together"):
+        judge_units((north, bare))
 
 
 _ROWS = ("time_s", "latitude_deg", "longitude_deg", "velocity_mps", "heading_deg")
