@@ -323,6 +323,20 @@ def test_without_noise_position_and_velocity_agree() -> None:
     assert one.motion.lag_s == pytest.approx(0.0, abs=0.005)
 
 
+def test_places_in_coarse_steps_differ_from_a_velocity_of_zero() -> None:
+    """Most steps are of nothing: the others are no outliers."""
+    time_s = times(0.5)
+    moved = np.isin(np.arange(len(time_s)) % 10, (3, 4, 5))  # there and back: two steps of ten
+    still = {f"velocity_{axis}_mps": np.zeros(len(time_s)) for axis in ("north", "east")}
+    one = receiver(table(time_s, place_m=np.column_stack([0.02 * moved, np.zeros(len(time_s))]), **still))
+    assert one.motion is not None and one.jumps_found == 0
+    assert one.motion.difference_rms_mps == pytest.approx(0.04 * np.sqrt(0.2), rel=0.01)
+    far = np.column_stack([0.02 * moved + 300.0 * (time_s == 90.0), np.zeros(len(time_s))])
+    one = receiver(table(time_s, place_m=far, **still))
+    assert one.motion is not None and one.jumps_found == 2
+    assert one.motion.difference_rms_mps == pytest.approx(0.04 * np.sqrt(0.2), rel=0.01), "without the jumps"
+
+
 @pytest.mark.parametrize("step_s", [0.1, 1.0])
 def test_noise_of_the_fixes_is_no_other_motion(step_s: float) -> None:
     """Fixes that scatter by 0.8 m at 10 Hz differ from their velocity by 11 m/s, and tell the same motion."""
