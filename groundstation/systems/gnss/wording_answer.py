@@ -65,7 +65,7 @@ def _lost(one: GnssReceiver) -> str:
     told = [_times("lost", lost), _times("nothing recorded", gaps)]
     if not lost and one.lost_s > 0.0:
         told[0] = f"lost for {seconds_text(one.lost_s)}"
-    return listed(told) or ("nothing lost" if not one.missed_epochs else f"fix never lost, {missing_of(one)}")
+    return listed(told) or listed(("fix never lost", missing_of(one) if one.missed_epochs else ""))
 
 
 def missing_of(one: GnssReceiver) -> str:

@@ -44,7 +44,9 @@ def test_shares_are_of_time_and_not_of_rows() -> None:
     one = receiver(table(time_s, fix=kinds))
     assert shares(one)["rtk_fixed"] == pytest.approx(1.0 / 3.0, abs=0.005)
     assert [state.state for state in one.states] == ["rtk_fixed", "rtk_float"]
-    assert answer(table(time_s, fix=kinds)).sentence.startswith("RTK float 67 %, RTK fixed 33 %, nothing lost; 12 sat")
+    assert answer(table(time_s, fix=kinds)).sentence.startswith(
+        "RTK float 67 %, RTK fixed 33 %, fix never lost; 12 sat"
+    )
 
 
 def test_never_a_fix_is_the_sentence_and_bad() -> None:
@@ -72,7 +74,7 @@ def test_a_fix_at_latitude_zero_is_none() -> None:
     assert shares(one)["none"] == pytest.approx(30.0 / WHOLE_S, abs=0.005)
     assert codes(table(time_s, **gone))["no_place"] == "warn"
     assert answer(table(time_s, **gone)).sentence.startswith(
-        "first fix after 30 s, then single (3D) throughout, nothing"
+        "first fix after 30 s, then single (3D) throughout, fix never"
     )
 
 
@@ -476,5 +478,5 @@ def test_a_row_that_is_late_is_no_missing_epoch() -> None:
     time_s = np.arange(0.0, 200.0, 0.5)
     time_s[[40, 90]] += 0.3
     found = reception(table(time_s))
-    assert found.answer.receiver.missed_epochs == 0 and "nothing lost" in found.answer.sentence
+    assert found.answer.receiver.missed_epochs == 0 and "fix never lost; 12 sat" in found.answer.sentence
     assert not any(isinstance(figure, GnssMissing) for figure in found.answer.figures)
