@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from groundstation.chapters.markdown import markdown
+from groundstation.chapters.parts import Note
 from groundstation.pipeline.api import open_flight
 from groundstation.results.flight import FlightResults
 from groundstation.systems.gnss.analysis import GNSS
@@ -141,3 +142,18 @@ def test_states_of_the_walk_and_the_drive_are_those_of_their_rows() -> None:
     seconds = {one.state: one.seconds for one in drive.receiver.states}
     assert seconds == pytest.approx({"rtk_fixed": 2189 / 4, "rtk_float": 8 / 4}, abs=0.01)
     assert drive.receiver.motion is not None and drive.receiver.motion.lag_s == pytest.approx(0.126, abs=0.005)
+
+
+@pytest.mark.real_log
+def test_a_receiver_at_odds_with_itself_is_told_in_its_chapter() -> None:
+    """Its firmware writes PDOP as HDOP of GGA, accuracies as HDOP and VDOP of GSA, and no height above the sea."""
+    results = open_flight(real_log("gnss/inertialsense_Serial38400.nmea")).results
+    section = gnss(results)
+    assert section is not None
+    notes = " ".join(part.text for part in section.parts if isinstance(part, Note))
+    assert "GSA says PDOP 1.1 to 1.5, HDOP 1 to 3 and VDOP 1 to 7 in 2307 rows, which cannot be" in notes
+    assert "is the PDOP of that GSA in 2307 rows" in notes and "Altitude 0 m, geoid 1382.23 to 1389.34 m" in notes
+    found = results.answer(GnssReception)
+    assert found is not None and found.receiver.hdop is None and found.receiver.pdop == 1.2
+    assert found.receiver.motion is not None
+    assert found.receiver.motion.difference_rms_mps == pytest.approx(0.054, abs=0.001)

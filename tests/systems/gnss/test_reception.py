@@ -223,6 +223,8 @@ def test_hdop_of_sentences_is_that_of_the_receiver() -> None:
     assert receiver(table(time_s), sentences(time_s, "raw.GNGGA", 0.62)).hdop == 0.8, "its own comes first"
     assert receiver(bare, sentences(time_s + 1000.0, "raw.GNGGA", 0.62)).hdop is None, "of other epochs"
     assert codes(bare, sentences(time_s, "raw.GNGGA", 4.0))["hdop_beyond"] == "warn"
+    with_pdop = table(time_s, hdop=None, pdop=np.full(len(time_s), 0.62))
+    assert receiver(with_pdop, sentences(time_s, "raw.GNGGA", 0.62)).hdop is None, "it is the PDOP"
     other = replace(table(time_s, hdop=None), topic="gnss.2")
     two = replace(bare, topic="gnss.1")
     assert receiver(two, other, sentences(time_s, "raw.GNGGA", 0.62)).hdop is None, "of which receiver is not known"
