@@ -88,7 +88,7 @@ def wholeness(results: FlightResults) -> str:
 
 
 def _cut(ledger: Ledger) -> str:
-    """Return that the end of a log is cut off, with the bytes of the record that it breaks off in."""
+    """Return that the end of a log is cut off, with the bytes of a record begun."""
     cut = ledger.truncated
     if cut is None:
         return ""

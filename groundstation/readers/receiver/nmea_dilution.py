@@ -1,4 +1,4 @@
-"""Dilution of precision from NMEA sentences: GSA states all three, GGA and GNS the horizontal one again.
+"""Dilution of precision from GSA, which states all three, and from GGA and GNS.
 
 PDOP² = HDOP² + VDOP² by their definition. A receiver that breaks it writes something else into the fields of GSA: the
 firmware of InertialSense, for one, has its PDOP in the HDOP of GGA as well, and its accuracies in metres in place of

@@ -74,7 +74,7 @@ class StreamTally:
     _most_satellites: float = 0.0
 
     def add(self, what: str, topic: str, places: Int64Array, **values: FloatArray) -> None:
-        """Count rows, which begin at ``places``, and keep the least and the largest of their values."""
+        """Count rows, which begin at ``places``, and keep the ends of their values."""
         self._count(self._rows, (what, topic), places)
         for name, some in values.items() if len(places) else ():
             least, most = self._ranges.setdefault((what, topic), {}).get(name, (np.inf, -np.inf))

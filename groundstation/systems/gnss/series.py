@@ -196,7 +196,7 @@ def _with_hdop(flight: Flight, table: Table) -> tuple[Table, str]:
 
 
 def _is_pdop(hdop: FloatArray, pdop: FloatArray) -> bool:
-    """Tell whether what a sentence calls HDOP is the PDOP: with height in the solution HDOP is smaller."""
+    """Tell whether what a sentence calls HDOP is the PDOP, which is always larger."""
     known = np.isfinite(hdop) & np.isfinite(pdop)
     return bool(known.any() and np.median(hdop[known] - pdop[known]) >= 0.0)
 

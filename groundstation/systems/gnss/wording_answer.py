@@ -157,8 +157,15 @@ def memory_of(stood: StandstillScatter) -> str:
         )
     return (
         f"it stood for {seconds_text(length_s)}, errors last about {seconds_text(stood.correlation_s)}: "
-        f"{stood.independent:.0f} independent value{'s' * (round(stood.independent) != 1)}"
+        f"{counted(round(stood.independent), 'independent value')}{_worth(stood)}"
     ) + (f"; {step}" if stood.resolution_m > STEP_TOLD * stood.scatter_m else "")
+
+
+def _worth(stood: StandstillScatter) -> str:
+    """Return what a mean over the longest time is worth."""
+    if stood.averaged_s is None or stood.averaged_scatter_m is None:
+        return ""
+    return f"; means over {seconds_text(stood.averaged_s)} scatter by {length_text(stood.averaged_scatter_m)}"
 
 
 def name_of(state: str) -> str:

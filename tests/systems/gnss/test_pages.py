@@ -17,6 +17,7 @@ from groundstation.tables.table import Table
 from tests.real_logs import real_log
 from tests.report_example import example
 from tests.systems.gnss.made import answer, table, times
+from tests.told import next_steps
 
 
 def results_of(*tables: Table) -> FlightResults:
@@ -157,3 +158,13 @@ def test_a_receiver_at_odds_with_itself_is_told_in_its_chapter() -> None:
     assert found is not None and found.receiver.hdop is None and found.receiver.pdop == 1.2
     assert found.receiver.motion is not None
     assert found.receiver.motion.difference_rms_mps == pytest.approx(0.054, abs=0.001)
+
+
+@pytest.mark.real_log
+@pytest.mark.parametrize(
+    ("name", "is_advised"), [("gnss/inertialsense_Serial38400.nmea", True), ("gnss/walk_0827_gnss_1730.ubx", False)]
+)
+def test_gst_is_advised_where_sentences_claim_no_accuracy(name: str, is_advised: bool) -> None:
+    section = next_steps(open_flight(real_log(name)).results)
+    told = "" if section is None else str(section.parts)
+    assert ("the NMEA sentence GST, the accuracy that the receiver claims" in told) is is_advised

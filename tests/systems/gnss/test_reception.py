@@ -12,7 +12,7 @@ from groundstation.systems.gnss.answer import VelocityAgainstPosition
 from groundstation.systems.gnss.arrays import GnssMissing
 from groundstation.systems.gnss.examine import shortfalls_of
 from groundstation.systems.gnss.settings import GnssSettings
-from groundstation.systems.gnss.wording_answer import meaning_of, same_claims
+from groundstation.systems.gnss.wording_answer import meaning_of, memory_of, same_claims
 from groundstation.tables.phases import PhaseInterval, Phases
 from groundstation.tables.table import Flight, Table
 from tests.systems.gnss.made import (
@@ -171,6 +171,28 @@ def test_scatter_of_white_errors_is_the_sigma_and_has_no_memory() -> None:
     assert not stood.is_held and not stood.is_coarse
     sentence = answer(table(times(), place_m=noisy(0.02), horizontal_sigma_m=claimed)).sentence
     assert f"scatter {100.0 * stood.scatter_m:.1f} cm where 2.0 cm is claimed" in sentence
+
+
+def test_errors_of_several_durations_last_as_long_as_their_means_say() -> None:
+    """What remains of a mean is what the duration told makes of it."""
+    rng, time_s = np.random.default_rng(6), np.arange(0.0, 4000.0, 1.0)
+    place = np.zeros((len(time_s), 2))
+    for sigma_m, lasts_s in ((0.6, 8.0), (0.5, 120.0)):
+        kept, drawn = np.exp(-1.0 / lasts_s), rng.normal(0.0, sigma_m, (len(time_s), 2))
+        drift = np.zeros_like(place)
+        drift[0] = drawn[0]
+        for row in range(1, len(time_s)):
+            drift[row] = kept * drift[row - 1] + np.sqrt(1.0 - kept**2) * drawn[row]
+        place += drift
+    still = {f"velocity_{axis}_mps": np.zeros(len(time_s)) for axis in ("north", "east")}
+    stood = receiver(table(time_s, place_m=place, **still)).standstill
+    assert stood is not None and stood.correlation_s is not None
+    assert stood.averaged_s == 512.0 and stood.averaged_scatter_m is not None
+    told_m = stood.scatter_m * np.sqrt(2.0 * stood.correlation_s / stood.averaged_s)
+    assert told_m >= stood.averaged_scatter_m * 0.999
+    true_s = (0.36 * 8.0 + 0.25 * 120.0) / 0.61  # durations by their power
+    assert stood.correlation_s == pytest.approx(true_s, rel=0.5)
+    assert "means over 8:32 min scatter by" in memory_of(stood)
 
 
 def two_kinds(**columns: object) -> Table:
