@@ -26,6 +26,8 @@ def test_a_flight_is_told_as_it_ends_and_once(capsys: pytest.CaptureFixture[str]
     lost = Outcome("more/a.csv", "data_lost", "reject: +2 deg", flight_id="A_2", was_finished=True)
     lines.tell((DONE, lost))
     assert capsys.readouterr().out == "more/a.csv  reject: +2 deg  data lost, finished before  A_2\n"
+    cut = Outcome("b.csv", "data_lost", "reject: +2 deg", flight_id="A_3", loss="end cut off")
+    assert line_of(cut) == "reject: +2 deg  end cut off  A_3"
 
 
 def test_what_is_learned_later_is_told_alone(capsys: pytest.CaptureFixture[str]) -> None:

@@ -74,6 +74,35 @@ def test_wholeness_names_the_end_the_places_and_the_gaps() -> None:
     assert wholeness(replace(MADE, status="degraded")) == "some of it lost", "never whole where data were lost"
 
 
+def cut_at_its_end(what: str, *more: str) -> FlightResults:
+    damages = tuple(
+        DamageEntry(count=41, kind=kind, loses_data=True, place="bytes 55 to 95", topic="", what=what)
+        for kind in ("truncated", *more)
+    )
+    ledger = Ledger(damages=damages, truncated=Truncation(count=41, place="bytes 55 to 95", what=what))
+    return replace(MADE, ledger=ledger, status="degraded")
+
+
+def test_a_cut_end_is_one_statement_of_its_weight() -> None:
+    chapters = systems().chapters
+    unfinished = cut_at_its_end("bytes of a frame that the end of the file cuts off")
+    assert unfinished.ledger.loss == "end cut off"
+    status = dict(front(unfinished, chapters).pairs)["Status"]
+    assert status == Mark("warn", "degraded: its end is cut off (41 bytes left of a record)")
+    assert "the recorder" not in told_advice(unfinished) and "copied" not in told_advice(unfinished)
+    not_whole = cut_at_its_end("bytes cut off")
+    assert dict(front(not_whole, chapters).pairs)["Status"] == Mark("warn", "degraded: its end is cut off")
+    assert "That the log was copied whole: its end is cut off." in told_advice(not_whole)
+    damaged = cut_at_its_end("bytes of a frame that the end of the file cuts off", "corrupt")
+    assert damaged.ledger.loss == "data lost" and "The recorder: data were lost." in told_advice(damaged)
+    assert dict(front(damaged, chapters).pairs)["Status"] == Mark("warn", "degraded: data were lost")
+
+
+def told_advice(results: FlightResults) -> str:
+    section = next_steps(results)
+    return "" if section is None else " ".join(str(pair) for part in section.parts for pair in part.pairs)  # type: ignore[attr-defined]
+
+
 def test_a_great_loss_comes_before_a_good_number() -> None:
     chapters = systems().chapters
     kept = replace(example(heading_result()), ledger=Ledger(topics={"gnss": topic(1.0, 80.0, "latitude_deg")}))

@@ -12,6 +12,9 @@ from typing import ClassVar
 from groundstation.base.serial import LEFT_OUT_WHEN_DEFAULT
 from groundstation.base.words import counted
 
+DATA_LOST, END_CUT = "data lost", "end cut off"
+TRUNCATED = "truncated"  # kind of the damage that the end of a file makes
+UNFINISHED = ("bytes of a", "row ")  # what such damage counts where a record was begun and not finished
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
 
 
@@ -266,7 +269,7 @@ class Ledger:
         ]
         if self.truncated is not None:
             told.append(f"cut at {self.truncated.place}")
-        return f"<Ledger: {', '.join(told)}; {'data lost' if self.loses_data else 'no data lost'}>"
+        return f"<Ledger: {', '.join(told)}; {self.loss or 'no data lost'}>"
 
     @property
     def rows(self) -> dict[str, int]:
@@ -282,3 +285,22 @@ class Ledger:
     def loses_data(self) -> bool:
         """Tell whether anything recorded could not be read, or the log is cut."""
         return self.truncated is not None or any(damage.loses_data for damage in self.damages)
+
+    @property
+    def loss(self) -> str:
+        """The loss in words: the end alone, or more than it; empty where nothing is lost.
+
+        Examples
+        --------
+        >>> cut = Truncation(count=41, place="bytes 55 to 95", what="bytes of a frame that is cut off")
+        >>> Ledger(truncated=cut).loss, Ledger().loss
+        ('end cut off', '')
+        """
+        if not self.loses_data:
+            return ""
+        return DATA_LOST if any(one.loses_data and one.kind != TRUNCATED for one in self.damages) else END_CUT
+
+    @property
+    def is_in_midst(self) -> bool:
+        """Tell whether all that is lost is the record that was being written when the log ended."""
+        return self.loss == END_CUT and self.truncated is not None and self.truncated.what.startswith(UNFINISHED)

@@ -217,6 +217,8 @@ class Damage:
 
 
 HEADING_IS_TRACK = "heading_is_track"  # code of a remark: the receiver lets the nose point along the motion
+# Codes of remarks on values of a receiver that cannot be, or that it contradicts itself.
+AT_ODDS = ("odd_height", "impossible_dilution", "same_dilution", "hdops_differ")
 
 
 @dataclass(frozen=True)

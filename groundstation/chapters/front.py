@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from groundstation.base.failures import attempt
 from groundstation.base.findings import worst
+from groundstation.base.ledger import END_CUT
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.words import capitalised
 from groundstation.chapters.assessed import not_assessed
@@ -17,7 +18,7 @@ from groundstation.chapters.grades import legend
 from groundstation.chapters.parts import Cell, Facts, Front, Mark, Note, Section, Tile
 from groundstation.chapters.wording import ABSENT, clean, duration, typeset
 from groundstation.results.flight import FlightResults, Status
-from groundstation.results.recorded import recorded, simulated
+from groundstation.results.recorded import recorded, simulated, wholeness
 
 NOTES = ("note", "notes", "comment", "comments", "remark", "remarks")  # keys of what the head of a log says of itself
 LONGEST_NOTE = 240
@@ -102,7 +103,7 @@ def _pairs(results: FlightResults) -> tuple[tuple[str, Cell], ...]:
     return (
         ("Start", f"{start[:10]} {start[11:19]} UTC" if start else "no absolute time"),
         _duration(results),
-        ("Status", STATUS[results.status]),
+        ("Status", _status(results)),
         ("Findings", _counts(results)),
         ("Log", results.source.name or ABSENT),
     )
@@ -116,6 +117,14 @@ def _pairs_of_plan(results: FlightResults) -> tuple[tuple[str, Cell], ...]:
         ("Findings", _counts(results)),
         scenario,
     )
+
+
+def _status(results: FlightResults) -> Mark:
+    """Return the status; of a log whose end alone is lost, that it is."""
+    mark = STATUS[results.status]
+    if results.status != "degraded" or results.ledger.loss != END_CUT:
+        return mark
+    return Mark(mark.tone, f"degraded: {wholeness(results).partition(';')[0]}")
 
 
 def _duration(results: FlightResults) -> tuple[str, str]:

@@ -6,6 +6,7 @@ them stands here. A signal that the log has is not asked for.
 
 from collections.abc import Iterator
 
+from groundstation.base.ledger import END_CUT
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.words import capitalised, listed
 from groundstation.chapters.chapter import Advice, Chapters, Remedies
@@ -32,6 +33,7 @@ BY_REASON_OF_AN_INS: Remedies = (
 )
 LOST = "the recorder: data were lost"
 UNNAMED = "the buses with an ICD (`run --icd FILE`; `info --suggest-icd` drafts one)"
+CUT = "that the log was copied whole: its end is cut off"
 
 
 def next_steps(results: FlightResults, chapters: Chapters) -> Section | None:
@@ -85,5 +87,5 @@ def _advice(results: FlightResults, chapters: Chapters) -> Iterator[Advice]:
             if part in one.reason:
                 yield Advice(line, text, purpose)
     yield from (advice for advice in given if not advice.is_pressing)
-    if results.status != "ok":
-        yield Advice("Check", LOST, "")
+    if results.status != "ok" and not results.ledger.is_in_midst:
+        yield Advice("Check", CUT if results.ledger.loss == END_CUT else LOST, "")

@@ -3,9 +3,12 @@
 from dataclasses import fields, is_dataclass
 from typing import Any
 
+import numpy as np
+
 from groundstation.base.clock import Clock, RelationEntry
 from groundstation.base.ledger import DamageEntry, Ledger
 from groundstation.base.signals import RAW_PREFIX
+from groundstation.base.words import counted
 from groundstation.chapters.parts import Facts, Figure, Grid, Head, Note, Section, kept
 from groundstation.chapters.provenance import source_pairs
 from groundstation.chapters.wording import (
@@ -55,17 +58,19 @@ def quality(results: FlightResults) -> Section:
 
 
 def _topics(results: FlightResults) -> Grid | None:
-    """Return the topics that answers rest on, with their losses.
+    """Return the topics that answers rest on, with their losses, and raw ones with gaps.
 
-    Topics of raw data where there are no others. Counts of zero are left out.
+    All topics of raw data where there are no others. Counts of zero are left out.
     """
     data = results.rows_of(LedgerRows)
     if data is None:
         return None
     names = data.topic.tolist()
     own = [place for place, name in enumerate(names) if not name.startswith(RAW_PREFIX)]
+    with_gaps = [place for place in np.flatnonzero(data.gaps > 0).tolist() if own and place not in own]
     shown = (own or list(range(len(names))))[:MOST_TOPICS]
-    counted = (
+    shown += with_gaps[: MOST_TOPICS - len(shown)]
+    columns = (
         ("Gaps", data.gaps),
         ("Duplicates", data.duplicates),
         ("Steps back", data.backward_steps),
@@ -75,17 +80,18 @@ def _topics(results: FlightResults) -> Grid | None:
         ("Out of range", data.out_of_range),
         ("Stuck", data.stuck),
     )
-    counts = [(title, values) for title, values in counted if values[shown].sum() > 0]
+    counts = [(title, values) for title, values in columns if values[shown].sum() > 0]
     rows = []
     for place in shown:
         rates = f"{significant(data.actual_rate_hz[place])} / {significant(data.nominal_rate_hz[place])}"
-        whole, gap = number(100.0 * data.coverage[place], 1, "%"), number(data.longest_gap_s[place], 2)
+        whole = number(100.0 * data.coverage[place], 1, "%")
+        gap = number(data.longest_gap_s[place], 2) if data.gaps[place] else ABSENT
         others = (number(int(values[place]), 0) for _, values in counts)
         rows.append((names[place], number(int(data.rows[place]), 0), rates, whole, gap, *others))
     titles = ("Topic", "Rows", "Rate / nominal, Hz", "Coverage", "Longest gap, s", *(title for title, _ in counts))
     heads = [Head(title, title != "Topic") for title in titles]
     more = len(data) - len(rows)
-    caption = f"{more} {'raw' if own else 'more'} topics in the table file." if more else ""
+    caption = f"{counted(more, 'raw topic' if own else 'more topic')} in the table file." if more else ""
     return Grid("Topics", heads, rows, caption, ("ledger",))
 
 

@@ -117,6 +117,8 @@ def line_of(outcome: Outcome, most: int | None = LONGEST) -> str:
     156
     """
     state = STATES.get(outcome.state, "")
+    if outcome.state == "data_lost" and outcome.loss:
+        state = outcome.loss
     is_told = outcome.text.startswith(f"{state}:")
     states = ("" if is_told else state, "finished before" if outcome.was_finished else "")
     behind = [part for part in (", ".join(filter(None, states)), outcome.flight_id) if part]

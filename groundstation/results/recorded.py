@@ -28,6 +28,7 @@ ATTITUDE = frozenset(("roll_deg", "pitch_deg"))
 HEADINGS = frozenset(("true_heading_deg", "magnetic_heading_deg"))
 MOVES = frozenset(("latitude_deg", "velocity_north_mps", "north_m", "position_north_m"))
 HOUR_S = 3600
+CUT_OFF = "its end is cut off"
 FEW_S = 120.0  # below it a length is told in seconds
 MOST_OF_IT = 0.95  # of a log: signals that last as long are as long as the log
 GREAT_LOSS = 0.05  # share of the time of GNSS or INS, from which a loss is what a report opens with
@@ -82,7 +83,7 @@ def wholeness(results: FlightResults) -> str:
     ledger = results.ledger
     places = sum(1 for one in ledger.damages if one.loses_data and one.kind != "truncated")
     lost = (
-        "its end is cut off" if ledger.truncated is not None else "",
+        _cut(ledger),
         counted(places, "damaged place") if places else "",
         _gaps(ledger),
         f"the recorder paused for {ledger.dropouts.total_s:.3g} s" if ledger.dropouts.count else "",
@@ -90,6 +91,18 @@ def wholeness(results: FlightResults) -> str:
     found = [text for text in lost if text]
     told = found or ["nothing lost" if results.status != "degraded" else "some of it lost"]
     return "; ".join(filter(None, (*told, _pauses(ledger))))
+
+
+def _cut(ledger: Ledger) -> str:
+    """Return that the end of a log is cut off, with the bytes of a record begun."""
+    cut = ledger.truncated
+    if cut is None:
+        return ""
+    return (
+        f"its end is cut off ({counted(cut.count, 'byte')} left of a record)"
+        if cut.what.startswith("bytes of a")
+        else CUT_OFF
+    )
 
 
 def great_loss(results: FlightResults) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from groundstation.base.clock import Clock
@@ -17,6 +18,7 @@ from groundstation.chapters.parts import Facts, Figure, Grid, Mark, Note, Part, 
 from groundstation.chapters.provenance import provenance
 from groundstation.chapters.quality import quality
 from groundstation.reports.drawing import Drawing, drawn_by
+from groundstation.results.arrays.flight import LedgerRows
 from groundstation.results.chosen import ChosenInterval
 from groundstation.results.flight import FlightResults, NotAssessable, Source
 from groundstation.results.gates import Gate
@@ -299,6 +301,21 @@ def test_ledger_has_a_row_for_each_topic() -> None:
     assert (gnss["Coverage"], gnss["Longest gap, s"]) == ("99.0%", "28.10")
     assert (gnss["Gaps"], gnss["Duplicates"], gnss["Steps back"]) == ("2", "14", "1")
     assert "Stuck" not in titles, "a ledger without that column counts nothing of it"
+
+
+def test_a_raw_topic_with_gaps_stands_beside_the_figure_that_shows_them() -> None:
+    whole = example(None)
+    rows = whole.rows_of(LedgerRows)
+    assert rows is not None
+    raw = replace(
+        rows,
+        topic=np.array([*(f"raw.{number}" for number in range(len(rows) - 1)), "gnss"]),
+        gaps=np.array([2, *(0 for _ in range(len(rows) - 1))]),
+        longest_gap_s=np.array([2.0, *(0.0 for _ in range(len(rows) - 1))]),
+    )
+    table = grid(quality(replace(whole, figures=(raw,))), "Topics")
+    place = [head.title for head in table.heads].index("Longest gap, s")
+    assert [(row[0], row[place]) for row in table.rows] == [("gnss", "—"), ("raw.0", "2.00")]
 
 
 def test_a_long_ledger_is_cut_and_says_so() -> None:

@@ -107,6 +107,22 @@ def test_dilution_is_that_of_the_systems_in_the_solution(tmp_path: Path) -> None
     assert Read(tmp_path, nmea(low[1:-5].decode())).values("gnss", "hdop") == [99.9]
 
 
+def test_a_dilution_that_cannot_be_is_none_and_is_told_with_its_values(tmp_path: Path) -> None:
+    """PDOP² = HDOP² + VDOP²: accuracies in place of HDOP and VDOP, and the PDOP as HDOP of GGA, as one maker has it."""
+    fields = "A,3,01,02,03,04,,,,,,,,"
+    first, second = (nmea(gga(f"12000{number}.00").replace(b"0.80", b"1.20")[1:-5].decode()) for number in (0, 1))
+    wrong = nmea(f"GNGSA,{fields},1.2,2.0,3.0"), nmea(f"GNGSA,{fields},1.2,3.0,5.0")
+    read = Read(tmp_path, first + wrong[0] + second + wrong[1])
+    assert read.values("gnss", "pdop") == [1.2, 1.2] and read.values("gnss", "hdop") in ([], [None, None])
+    assert "PDOP 1.2, HDOP 2 to 3 and VDOP 3 to 5 in 2 rows, which cannot be" in read.remark("impossible_dilution")
+    assert "HDOP of GGA or GNS (1.2) is the PDOP of that GSA in 2 rows" in read.remark("same_dilution")
+    own = Read(tmp_path, gga("120000.00") + wrong[0])
+    assert own.values("gnss", "hdop") == [0.8], "that of GGA is another number"
+    sound = Read(tmp_path, first + nmea(f"GNGSA,{fields},1.5,0.9,1.2"))
+    assert (sound.values("gnss", "pdop"), sound.values("gnss", "hdop")) == ([1.5], [1.2])
+    assert "HDOP differs between sentences in 1 row: 1.2 (GGA), 0.9 (GSA)" in sound.remark("hdops_differ")
+
+
 @pytest.mark.parametrize(("unit", "heading"), [("T", 12.5), ("", 12.5), ("M", None)])
 def test_a_heading_is_true_where_it_says_so(tmp_path: Path, unit: str, heading: float | None) -> None:
     read = Read(tmp_path, gga("120000.00") + rmc("120000.00", "040526") + nmea(f"GPHDT,12.5,{unit}"))

@@ -183,7 +183,7 @@ def test_older_receivers_tell_the_fix_apart_from_the_position(tmp_path: Path) ->
 def test_qualities(tmp_path: Path, quality: int, fix: str, integrity: bool | None) -> None:
     read = Read(tmp_path, gga("120000.00", quality=quality))
     assert read.values("gnss", "fix") == [fix] and read.values("gnss", "integrity_ok") == [integrity]
-    assert ("1 fixes are simulated" in read.remark("not_measured")) == (fix in ("manual", "simulated"))
+    assert ("1 fix is simulated" in read.remark("not_measured")) == (fix in ("manual", "simulated"))
 
 
 @pytest.mark.parametrize(

@@ -216,3 +216,15 @@ def occupied(topic: str, places: Int64Array, time: Column, columns: Columns) -> 
     rows = np.logical_or.reduce([column.mask for column in columns.values()])
     batch = RecordBatch(topic, places, time, columns)
     return batch if rows.all() else (batch.take(rows) if rows.any() else None)
+
+
+def merged(columns: Columns, newer: Columns) -> Columns:
+    """Merge columns: newer values where there are any, older ones elsewhere."""
+    merged = {}
+    for name, column in newer.items():
+        before = columns.get(name)
+        if before is not None:
+            values = np.where(column.mask, column.values, before.values)
+            column = Column(values, column.mask | before.mask)
+        merged[name] = column
+    return merged

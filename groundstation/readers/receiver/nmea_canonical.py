@@ -10,8 +10,9 @@ from groundstation.base.records import BoolArray, Column, RecordBatch
 from groundstation.base.units import MPS_PER_KMH, MPS_PER_KNOT
 from groundstation.readers.layout import velocity_from_track
 from groundstation.readers.receiver.credible import HEADINGS, credible_attitude, credible_dilution, credible_position
-from groundstation.readers.receiver.messages import Columns, occupied
+from groundstation.readers.receiver.messages import Columns, merged, occupied
 from groundstation.readers.receiver.nmea import SentenceEpochs
+from groundstation.readers.receiver.nmea_dilution import dilution
 from groundstation.readers.receiver.nmea_makers import makers_solution
 from groundstation.readers.receiver.sentence_layouts import STANDARD_POSITIONS
 from groundstation.readers.receiver.sentences import Sentences
@@ -42,10 +43,10 @@ def gnss_batch(epochs: SentenceEpochs, time: Column, tally: StreamTally) -> Reco
     """Return one row for each epoch that has a fix, or says that it has none."""
     columns = makers_solution(epochs)
     for formatter in STANDARD_POSITIONS:  # the last that has a position gives it
-        columns |= _merged(columns, _position(epochs, formatter))
+        columns |= merged(columns, _position(epochs, formatter))
     _add_heights(epochs, columns, tally)
     columns |= _velocity(epochs)
-    columns |= credible_dilution(_quality(epochs)) | _signals(epochs)
+    columns |= credible_dilution(_quality(epochs, tally)) | _signals(epochs)
     _add_solution(epochs, columns, tally)
     columns |= _age(epochs, columns["fix"])
     columns = credible_position(columns, "gnss", epochs.places, tally)
@@ -54,18 +55,6 @@ def gnss_batch(epochs: SentenceEpochs, time: Column, tally: StreamTally) -> Reco
         return None
     rows: BoolArray = np.logical_or.reduce([column.mask for column in columns.values()])
     return RecordBatch("gnss", epochs.places, time, columns).take(rows)
-
-
-def _merged(columns: Columns, newer: Columns) -> Columns:
-    """Merge columns: newer values where there are any, older ones elsewhere."""
-    merged = {}
-    for name, column in newer.items():
-        before = columns.get(name)
-        if before is not None:
-            values = np.where(column.mask, column.values, before.values)
-            column = Column(values, column.mask | before.mask)
-        merged[name] = column
-    return merged
 
 
 _VALIDITY = {"GGA": ("quality",), "RMC": ("status", "posMode"), "GLL": ("status", "posMode"), "GNS": ("posMode",)}
@@ -112,12 +101,13 @@ def _add_heights(epochs: SentenceEpochs, columns: Columns, tally: StreamTally) -
             valid &= ~found[unit].mask | (found[unit].values == "M")
         has_height, has_both = found["alt"].mask & valid, found["alt"].mask & found["sep"].mask & valid
         is_astray = has_both & (np.abs(found["sep"].values) > MOST_SEPARATION_M)
-        tally.add(ASTRAY, "gnss", epochs.places[is_astray])
+        values = {name: found[name].values[is_astray] for name in ("alt", "sep")}
+        tally.add(ASTRAY, "gnss", epochs.places[is_astray], **values)
         heights = {
             "altitude_msl_m": Column(found["alt"].values, has_height & ~is_astray),
             "altitude_ellipsoid_m": Column(found["alt"].values + found["sep"].values, has_both),
         }
-        columns |= _merged(columns, heights)
+        columns |= merged(columns, heights)
 
 
 def _velocity(epochs: SentenceEpochs) -> Columns:
@@ -136,7 +126,7 @@ def _velocity(epochs: SentenceEpochs) -> Columns:
         invalid = quality["quality"].mask & (quality["quality"].values == 0)
     if not all((one.mask | invalid).all() for one in told.values()) or not told:
         made_good = _of_track_made_good(epochs.values("VTG", _TRACK_MADE_GOOD))
-        told = made_good | _merged(made_good, told)
+        told = made_good | merged(made_good, told)
     if not told:
         return {}
     speed, track = (Column(told[name].values, told[name].mask & ~invalid) for name in ("ground_speed_mps", "track_deg"))
@@ -164,7 +154,7 @@ def _of_track_made_good(found: Columns) -> Columns:
     valid = ~(found["posMode"].mask & (found["posMode"].values == "N"))
     in_knots, in_kmh = _speed(found["sogn"], found["sognUnit"], "N"), _speed(found["sogk"], found["sogkUnit"], "K")
     first, second = _true(found["cogt"], found["cogtUnit"], "T"), _true(found["cogm"], found["cogmUnit"], "M")
-    speed, track = _merged({"": in_kmh}, {"": in_knots})[""], _merged({"": second}, {"": first})[""]
+    speed, track = merged({"": in_kmh}, {"": in_knots})[""], merged({"": second}, {"": first})[""]
     return {
         "ground_speed_mps": Column(speed.values, speed.mask & valid),
         "track_deg": Column(track.values, track.mask & valid),
@@ -181,16 +171,12 @@ def _true(value: Column, unit: Column, usual: str) -> Column:
     return Column(value.values, value.mask & (np.where(unit.mask, unit.values, usual) == "T"))
 
 
-def _quality(epochs: SentenceEpochs) -> Columns:
-    columns: Columns = {}
-    dilution = epochs.values("GSA", ("PDOP", "HDOP"))
-    if dilution:  # a system without a satellite in the solution repeats it, or has nothing to say
-        dilution |= _merged(dilution, epochs.values("GSA", ("PDOP", "HDOP"), _has_satellites))
-        columns |= {"pdop": dilution["PDOP"], "hdop": dilution["HDOP"]}
+def _quality(epochs: SentenceEpochs, tally: StreamTally) -> Columns:
+    columns = dilution(epochs, tally)
     for formatter in ("GNS", "GGA"):
-        found = epochs.values(formatter, ("HDOP", "numSV"))
+        found = epochs.values(formatter, ("numSV",))
         if found:
-            columns |= _merged(columns, {"hdop": found["HDOP"], "satellites_used": found["numSV"]})
+            columns |= merged(columns, {"satellites_used": found["numSV"]})
     spread = epochs.values("GST", ("stdLat", "stdLong", "stdAlt"))
     if spread:
         both = spread["stdLat"].mask & spread["stdLong"].mask
@@ -234,12 +220,8 @@ def _age(epochs: SentenceEpochs, fix: Column) -> Columns:
         found = epochs.values(formatter, ("diffAge",))
         if found:
             age = found["diffAge"]
-            columns |= _merged(columns, {"age_of_corrections_s": Column(age.values, age.mask & corrected)})
+            columns |= merged(columns, {"age_of_corrections_s": Column(age.values, age.mask & corrected)})
     return columns
-
-
-def _has_satellites(sentences: Sentences) -> BoolArray:
-    return sentences.columns["svid_01"].mask
 
 
 def _add_solution(epochs: SentenceEpochs, columns: Columns, tally: StreamTally) -> None:
@@ -261,8 +243,8 @@ def _add_solution(epochs: SentenceEpochs, columns: Columns, tally: StreamTally) 
             columns[name] = Column(columns[name].values, columns[name].mask & ~flat)
     else:
         flat = kind.mask & (kind.values == _FLAT)
-    columns |= _merged(columns, {"fix": Column(_FIXES[kind.values], kind.mask)})
-    columns |= _merged(columns, {"integrity_ok": Column(trusted.values, trusted.mask & ~(flat & trusted.values))})
+    columns |= merged(columns, {"fix": Column(_FIXES[kind.values], kind.mask)})
+    columns |= merged(columns, {"integrity_ok": Column(trusted.values, trusted.mask & ~(flat & trusted.values))})
 
 
 def _kind(epochs: SentenceEpochs) -> Column:
@@ -277,13 +259,13 @@ def _kind(epochs: SentenceEpochs) -> Column:
             modes = found["posMode"].values
             letters = np.ascontiguousarray(modes).view(np.uint32).reshape(len(modes), -1)
             of_mode = _KIND_OF_RANK[_RANKS[np.minimum(letters, len(_RANKS) - 1)].max(axis=1)]
-            kind = _merged({"": kind}, {"": Column(of_mode, found["posMode"].mask)})[""]
+            kind = merged({"": kind}, {"": Column(of_mode, found["posMode"].mask)})[""]
     found = epochs.values("GGA", ("quality",))
     if found:
         quality = found["quality"].values
         is_known = (quality >= 0) & (quality < len(_OF_QUALITY) - 1) & (quality == np.floor(quality))
         of_quality = _OF_QUALITY[np.where(is_known, quality, len(_OF_QUALITY) - 1).astype(np.int64)]
-        kind = _merged({"": kind}, {"": Column(of_quality, found["quality"].mask)})[""]
+        kind = merged({"": kind}, {"": Column(of_quality, found["quality"].mask)})[""]
     return kind
 
 

@@ -6,15 +6,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import NO_POSITION
-from groundstation.base.records import HEADING_IS_TRACK, Damage, Int64Array, Item, RecordBatch, Remark
+from groundstation.base.records import AT_ODDS, HEADING_IS_TRACK, Damage, Int64Array, Item, RecordBatch, Remark
+from groundstation.base.words import counted
 from groundstation.readers.receiver.messages import Messages
 from groundstation.readers.receiver.sentences import Sentences
 
 MOST_SEPARATION_M = 120.0  # separation of geoid and ellipsoid; on Earth it is within 107 m
 MOST_ROLL_DEG, MOST_PITCH_DEG, MOST_HEADING_DEG = 180.0, 90.0, 360.0
 MOVING_MPS = 1.0
-ZERO_POSITION, IMPOSSIBLE_ATTITUDE, ASTRAY, NOT_MEASURED = "no_position", "impossible", "odd_height", "not_measured"
+ZERO_POSITION, IMPOSSIBLE_ATTITUDE, NOT_MEASURED = "no_position", "impossible", "not_measured"
 _NEARLY_ALL = 0.99
 _NAMES_TOLD = 5
 _REFUSED = {
@@ -22,12 +24,25 @@ _REFUSED = {
     IMPOSSIBLE_ATTITUDE: f"records with a roll beyond {MOST_ROLL_DEG:g}, a pitch beyond {MOST_PITCH_DEG:g} or a "
     f"heading beyond {MOST_HEADING_DEG:g} deg: no attitude, kept as raw values alone",
 }
+ASTRAY, IMPOSSIBLE_DILUTION, SAME_DILUTION, HDOPS_DIFFER = AT_ODDS
 _ODD = {
-    ASTRAY: f"geoid and ellipsoid are said to be over {MOST_SEPARATION_M:.0f} m apart in {{count}} rows, which they "
-    "never are: altitude_msl_m left out, their sum kept as altitude_ellipsoid_m",
-    NOT_MEASURED: "{count} fixes are simulated or entered by hand, as the receiver says: integrity_ok is false",
+    ASTRAY: "altitude {alt} m, geoid {sep} m above the ellipsoid in {count}, as the receiver says, and it never is "
+    f"further than {MOST_SEPARATION_M:.0f} m: no height above the sea (altitude_msl_m); their sum is kept as the one "
+    "above the ellipsoid (altitude_ellipsoid_m)",
+    NOT_MEASURED: "{count} simulated or entered by hand, as the receiver says: integrity_ok is false",
+    IMPOSSIBLE_DILUTION: "GSA says PDOP {PDOP}, HDOP {HDOP} and VDOP {VDOP} in {count}, which cannot be, as PDOP² = "
+    "HDOP² + VDOP²: its HDOP and VDOP are something else, accuracies in metres perhaps, and are left out",
+    SAME_DILUTION: "the HDOP of GGA or GNS ({HDOP}) is the PDOP of that GSA in {count}: one number with two names, "
+    "kept as PDOP",
+    HDOPS_DIFFER: "HDOP differs between sentences in {count}: {values}; that of GGA is taken, else of GNS",
 }
-_FIELDS = {ASTRAY: ("altitude_ellipsoid_m",), NOT_MEASURED: ("fix",)}
+_FIELDS = {
+    ASTRAY: ("altitude_ellipsoid_m",),
+    NOT_MEASURED: ("fix",),
+    IMPOSSIBLE_DILUTION: ("pdop",),
+    SAME_DILUTION: ("pdop",),
+    HDOPS_DIFFER: ("hdop",),
+}
 SHORTER, OTHER_LENGTH, ODD_TEXT = "shorter", "of another length", "odd text"
 _LENGTHS = {
     SHORTER: "messages shorter than their layout: only the fields that they have are kept",
@@ -51,15 +66,19 @@ class StreamTally:
     _lengths: Counter[tuple[str, str]] = field(default_factory=Counter)
     _cells: Counter[tuple[str, str]] = field(default_factory=Counter)
     _first: dict[tuple[str, str], int] = field(default_factory=dict)
+    _ranges: dict[tuple[str, str], dict[str, tuple[float, float]]] = field(default_factory=dict)
     _as_track: int = 0
     _moving: int = 0
     _fixes: int = 0
     _positions: int = 0
     _most_satellites: float = 0.0
 
-    def add(self, what: str, topic: str, places: Int64Array) -> None:
-        """Count rows, which begin at ``places``."""
+    def add(self, what: str, topic: str, places: Int64Array, **values: FloatArray) -> None:
+        """Count rows, which begin at ``places``, and keep the ends of their values."""
         self._count(self._rows, (what, topic), places)
+        for name, some in values.items() if len(places) else ():
+            least, most = self._ranges.setdefault((what, topic), {}).get(name, (np.inf, -np.inf))
+            self._ranges[what, topic][name] = (min(least, float(some.min())), max(most, float(some.max())))
 
     def add_lengths(self, messages: Messages, is_poll: bool) -> None:
         """Count the messages whose payload does not fit their layout.
@@ -95,6 +114,14 @@ class StreamTally:
             counter[key] += len(places)
             self._first.setdefault(key, int(np.min(places)))
 
+    def _odd(self, what: str, topic: str, count: int) -> str:
+        """Return what is odd of some rows, with the values that they have."""
+        ranges = {name: _range(*ends) for name, ends in self._ranges.get((what, topic), {}).items()}
+        values = ", ".join(f"{text} ({name})" for name, text in ranges.items())
+        noun = counted(count, "fix", "fixes") if what == NOT_MEASURED else counted(count, "row")
+        verb = (" is" if count == 1 else " are") if what == NOT_MEASURED else ""
+        return _ODD[what].format(count=f"{noun}{verb}", values=values, **ranges)
+
     def items(self, counts: Counter[str]) -> Iterator[Item]:
         """Yield remarks and damage; the raw topics keep what was refused.
 
@@ -114,7 +141,7 @@ class StreamTally:
             yield Remark(HEADING_IS_TRACK, text, "ins", ("true_heading_deg",))
         for (what, topic), count in sorted(self._rows.items()):
             if what in _ODD:
-                yield Remark(what, _ODD[what].format(count=count), topic, _FIELDS[what])
+                yield Remark(what, self._odd(what, topic, count), topic, _FIELDS[what])
             else:
                 place = f"{topic}, the first at byte {self._first[what, topic]}"
                 yield Damage(what, place, count, _REFUSED[what], topic, loses_data=False)
@@ -127,6 +154,18 @@ class StreamTally:
         for (address, name), count in sorted(self._cells.items()):
             topic = f"raw.{address}"
             yield Damage("unreadable_cells", f"{topic}.{name}", count, "cells that are no number", topic)
+
+
+def _range(least: float, most: float) -> str:
+    """Return least and largest value, once where they are the same.
+
+    Examples
+    --------
+    >>> _range(0.0, 0.0), _range(1382.35, 1397.1)
+    ('0', '1382.35 to 1397.1')
+    """
+    texts = list(dict.fromkeys(f"{value:.2f}".rstrip("0").rstrip(".") for value in (least, most)))
+    return " to ".join(texts)
 
 
 def _named(counts: Counter[str]) -> str:

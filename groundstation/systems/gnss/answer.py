@@ -106,8 +106,8 @@ class StandstillScatter:
     claimed_m, up_claimed_m : float or None
         Median sigmas that the receiver claims.
     correlation_s : float or None
-        Time after which errors are correlated by less than 1/e; None: longer than a tenth of the standstill, so that
-        the scatter understates the error.
+        Time after which errors are correlated by less than 1/e, or the longer one by which means over a time scatter;
+        None: longer than a tenth of the standstill, so that the scatter understates the error.
     independent : float
         Values that are independent of each other; 1 where the correlation is not known.
     speed_rms_mps, claimed_mps : float or None
@@ -118,6 +118,8 @@ class StandstillScatter:
         The receiver repeats one position: it holds it while it believes to stand.
     phase_start_s, phase_end_s : float or None
         Standstill of the overview that this lies in; None where the phases show none.
+    averaged_s, averaged_scatter_m : float or None
+        What a mean over the longest time is worth.
     """
 
     start_s: float
@@ -137,6 +139,8 @@ class StandstillScatter:
     #: Flight second at which the standstill of the overview begins; null without one.
     phase_start_s: float | None = None
     phase_end_s: float | None = None  #: Flight second at which the standstill of the overview ends.
+    averaged_s: float | None = None  #: Longest time of which four means or more fit into the standstill.
+    averaged_scatter_m: float | None = None  #: Horizontal standard deviation of the means over that time.
 
     @property
     def is_coarse(self) -> bool:

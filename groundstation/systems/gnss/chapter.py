@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.base.records import AT_ODDS
 from groundstation.base.words import capitalised
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, Tone, kept
@@ -62,6 +63,11 @@ def gnss(results: FlightResults) -> Section | None:
     if not answer.has_heading_source:
         notes.append(Note(NO_HEADING))
     notes += [Note(with_full_stop(typeset(same))) for same in _same_claims(answer)]
+    notes += [
+        Note(with_full_stop(typeset(capitalised(one.text))), "warn")
+        for one in results.ledger.remarks
+        if one.code in AT_ODDS and one.topic in {receiver.topic for receiver in answer.receivers}
+    ]
     parts: list[Part | None] = [*notes, Figure("gnss.states"), _states(answer), _quality(answer)]
     for one in answer.receivers:
         parts += [Figure("gnss.quality", of=one.topic), *_standstill(one, answer), *_motion(one, answer)]
@@ -83,7 +89,7 @@ def _claim(answer: GnssReception) -> Claim:
     remark = "" if best is None else name_of(best.state)
     told = [
         ("Satellites", number(main.satellites_used, 0), "median"),
-        ("HDOP", number(main.hdop, 1), "median"),
+        ("HDOP", number(main.hdop, 1), "median") if main.hdop is not None else ("PDOP", number(main.pdop, 1), "median"),
         ("C/N0", number(main.cn0_dbhz, 0, "dB-Hz"), "median"),
     ]
     stood = main.told_standstill
@@ -152,6 +158,13 @@ def _with_tail(name: str, tail: str, places: int, unit: str = "") -> Callable[[G
 _hdop = _with_tail("hdop", "hdop_high", 2)
 
 
+def _vdop(one: GnssReceiver) -> float | None:
+    """Return the vertical dilution by PDOP² = HDOP² + VDOP², of medians; None without both."""
+    if one.pdop is None or one.hdop is None or one.pdop <= one.hdop:
+        return None
+    return float(np.sqrt(one.pdop**2 - one.hdop**2))
+
+
 def _length(value: float | None) -> str:
     return NOT_LOGGED if value is None else length_text(value)
 
@@ -179,6 +192,7 @@ QUALITY: tuple[tuple[str, Callable[[GnssReceiver], str]], ...] = (
     ("C/N0", _with_tail("cn0_dbhz", "cn0_low_dbhz", 1, "dB-Hz")),
     ("HDOP", lambda one: _hdop(one) + (f", from {one.hdop_of.removeprefix('raw.')}" if one.hdop_of else "")),
     ("PDOP", _with_tail("pdop", "pdop_high", 2)),
+    ("VDOP, of the two", lambda one: number(_vdop(one), 2)),
     ("Claimed horizontal σ", lambda one: _length(one.horizontal_sigma_m)),
     ("Claimed vertical σ", lambda one: _length(one.vertical_sigma_m)),
     (

@@ -19,6 +19,7 @@ MAD_TO_SIGMA = 1.4826
 ALONG_ONLY = 0.2  # of its part along the motion: a smaller part across is a shift in time
 FAST_MPS = 5.0  # slower, a step along the motion is as likely one of the place
 ROBUST_SIGMAS = 5.0
+ROUNDING = 1e-6  # m or m/s: a smaller difference is none
 BY_PHASE = ("rtk_fixed", "rtk_float", "ppp")
 
 
@@ -115,7 +116,17 @@ def _lasting_mps(beyond_m: FloatArray, step_s: FloatArray, usable: BoolArray) ->
 
 def _is_usual(size: FloatArray) -> BoolArray:
     """Tell which differences are no outliers, as jumps of the position are."""
-    return np.asarray(size <= ROBUST_SIGMAS * max(MAD_TO_SIGMA * float(np.median(size)), 1e-6))
+    return np.asarray(size <= max(ROBUST_SIGMAS * _usual(size), ROUNDING))
+
+
+def _usual(size: FloatArray) -> float:
+    """Return the usual size of differences, as a sigma.
+
+    Differences of nothing are left out: between rows of the same place, as a receiver writes it in coarse steps or
+    holds it, they say nothing of the others. 0 where there are no others.
+    """
+    beyond = size[size > ROUNDING]
+    return MAD_TO_SIGMA * float(np.median(beyond)) if beyond.size else 0.0
 
 
 def slope(x: FloatArray, y: FloatArray) -> tuple[float, float]:
@@ -145,7 +156,7 @@ def _jumps(
     finite = np.isfinite(size)
     if np.count_nonzero(finite) < LEAST_STEPS:
         return (), 0
-    usual = max(MAD_TO_SIGMA * float(np.median(size[finite])), 0.0)
+    usual = _usual(size[finite])
     precise = np.isin(one.state, BY_PHASE)
     precise[1:] &= precise[:-1]
     least_m = np.where(precise, settings.jump_min_rtk_m, settings.jump_min_m)

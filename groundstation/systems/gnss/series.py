@@ -189,10 +189,16 @@ def _with_hdop(flight: Flight, table: Table) -> tuple[Table, str]:
         time_ns = flight[topic].time_ns[known]
         nearest = nearest_rows(time_ns, table.time_ns)
         near = np.abs(time_ns[nearest] - table.time_ns) <= 0.5 * np.median(np.diff(table.time_ns))
-        if near.any():
-            hdop = np.where(near, values[known][nearest], np.nan)
+        hdop = np.where(near, values[known][nearest], np.nan)
+        if near.any() and not _is_pdop(hdop, table.values("pdop")):
             return replace(table, columns={**table.columns, "hdop": Column(hdop, near)}), topic
     return table, ""
+
+
+def _is_pdop(hdop: FloatArray, pdop: FloatArray) -> bool:
+    """Tell whether what a sentence calls HDOP is the PDOP, which is always larger."""
+    known = np.isfinite(hdop) & np.isfinite(pdop)
+    return bool(known.any() and np.median(hdop[known] - pdop[known]) >= 0.0)
 
 
 def _states(table: Table, has_any: BoolArray) -> NDArray[np.str_]:

@@ -133,11 +133,14 @@ def _judged(one: ReceiverRows, rows: NDArray[np.intp], phases: Phases) -> Stood:
     repeats = bool(np.mean(np.all(np.diff(offset[:, :2], axis=0) == 0.0, axis=1)) > HELD_SHARE)
     is_held = repeats and resolution_m < FINE_M
     is_coarse = not is_held and resolution_m > COARSE * _spread(offset[:, :2])
+    averaged_s, scatter = scatter_of_means(offset[:, :2], step_s)
     correlation_s = None if is_held or is_coarse else correlation_time_s(offset[:, :2], step_s)
+    if correlation_s is not None:
+        correlation_s = max(correlation_s, memory_of_means_s(averaged_s, scatter))
+        correlation_s = correlation_s if BELIEVED * correlation_s <= length_s else None
     independent = 1.0
     if correlation_s is not None:
         independent = max(min(length_s / max(2.0 * correlation_s, step_s), float(len(rows))), 1.0)
-    averaged_s, scatter = scatter_of_means(offset[:, :2], step_s)
     speed = one.speed_mps[rows]
     phase_start_s, phase_end_s = _phase_of(phases, float(one.time_s[rows[0]]), float(one.time_s[rows[-1]]))
     answer = StandstillScatter(
@@ -157,6 +160,8 @@ def _judged(one: ReceiverRows, rows: NDArray[np.intp], phases: Phases) -> Stood:
         is_held=is_held,
         phase_start_s=phase_start_s,
         phase_end_s=phase_end_s,
+        averaged_s=float(averaged_s[-1]) if len(averaged_s) else None,
+        averaged_scatter_m=float(scatter[-1]) if len(averaged_s) else None,
     )
     return Stood(answer, rows, offset, averaged_s, scatter)
 
@@ -194,6 +199,26 @@ def correlation_time_s(offset_m: FloatArray, step_s: float) -> float | None:
         return None
     below = np.flatnonzero(together / together[0] < np.exp(-1.0))
     return float(below[0] * step_s) if below.size else None
+
+
+def memory_of_means_s(averaged_s: FloatArray, scatter_m: FloatArray) -> float:
+    """Return how long errors last by the scatter of means, the longest of all.
+
+
+    Values that are independent after ``2 t`` leave ``scatter * sqrt(2 t / T)`` of a mean over ``T``. Errors of several
+    durations look shorter where they are first correlated by less than 1/e: their means tell the longest.
+
+    Examples
+    --------
+    >>> times_s = np.array([0.5, 16.0, 256.0])
+    >>> memory_of_means_s(times_s, np.array([0.94, 0.94 / np.sqrt(32.0), 0.94 / np.sqrt(512.0)]))
+    0.25
+    >>> round(memory_of_means_s(times_s, np.array([0.94077, 0.93177, 0.74909])))
+    81
+    """
+    if not len(averaged_s) or not scatter_m[0] > 0.0:
+        return 0.0
+    return float(np.round(np.max(0.5 * averaged_s * (scatter_m / scatter_m[0]) ** 2), 9))
 
 
 def scatter_of_means(offset_m: FloatArray, step_s: float) -> tuple[FloatArray, FloatArray]:

@@ -65,7 +65,7 @@ def _lost(one: GnssReceiver) -> str:
     told = [_times("lost", lost), _times("nothing recorded", gaps)]
     if not lost and one.lost_s > 0.0:
         told[0] = f"lost for {seconds_text(one.lost_s)}"
-    return listed(told) or ("nothing lost" if not one.missed_epochs else f"fix never lost, {missing_of(one)}")
+    return listed(told) or listed(("fix never lost", missing_of(one) if one.missed_epochs else ""))
 
 
 def missing_of(one: GnssReceiver) -> str:
@@ -157,8 +157,15 @@ def memory_of(stood: StandstillScatter) -> str:
         )
     return (
         f"it stood for {seconds_text(length_s)}, errors last about {seconds_text(stood.correlation_s)}: "
-        f"{stood.independent:.0f} independent value{'s' * (round(stood.independent) != 1)}"
+        f"{counted(round(stood.independent), 'independent value')}{_worth(stood)}"
     ) + (f"; {step}" if stood.resolution_m > STEP_TOLD * stood.scatter_m else "")
+
+
+def _worth(stood: StandstillScatter) -> str:
+    """Return what a mean over the longest time is worth."""
+    if stood.averaged_s is None or stood.averaged_scatter_m is None:
+        return ""
+    return f"; means over {seconds_text(stood.averaged_s)} scatter by {length_text(stood.averaged_scatter_m)}"
 
 
 def name_of(state: str) -> str:

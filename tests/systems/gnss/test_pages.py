@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from groundstation.chapters.markdown import markdown
+from groundstation.chapters.parts import Note
 from groundstation.pipeline.api import open_flight
 from groundstation.results.flight import FlightResults
 from groundstation.systems.gnss.analysis import GNSS
@@ -16,6 +17,7 @@ from groundstation.tables.table import Table
 from tests.real_logs import real_log
 from tests.report_example import example
 from tests.systems.gnss.made import answer, table, times
+from tests.told import next_steps
 
 
 def results_of(*tables: Table) -> FlightResults:
@@ -31,7 +33,7 @@ def test_the_chapter_says_the_sentence_and_not_logged() -> None:
     section = gnss(results)
     assert section is not None and section.claim is not None
     text = markdown(section)
-    assert section.headline.startswith("single (3D) throughout, nothing lost; 12 satellites")
+    assert section.headline.startswith("single (3D) throughout, fix never lost; 12 satellites")
     assert "not logged" in text and section.claim.mark.text == "Good"
 
 
@@ -55,7 +57,7 @@ def test_the_page_opens_with_what_is_against_the_reception() -> None:
     assert not any("Fewer than 5" in one for one in few.claim.sentences), "told once"
     good = gnss(results_of(table(times())))
     assert good is not None and good.claim is not None and good.claim.value == "100 %"
-    assert good.claim.headline.startswith("Single (3D) throughout, nothing lost")
+    assert good.claim.headline.startswith("Single (3D) throughout, fix never lost")
 
 
 def test_the_share_of_the_tile_is_of_all_the_time_and_not_of_that_after_the_first_fix() -> None:
@@ -101,19 +103,19 @@ def test_columns_of_the_tables_of_flights() -> None:
 
 
 EXPECTED = {
-    "gnss/walk_0827_gnss_1730.ubx": ("warn", "RTK fixed 65 %, RTK float 35 %, nothing lost; 25 satellites"),
-    "gnss/walk_0827_gnss_1730_sf.pos": ("warn", "RTK fixed 65 %, RTK float 35 %, nothing lost; 25 satellites"),
-    "gnss/drive_0708_gnss_1934_sf.pos": ("good", "RTK fixed 99.6 %, RTK float 0.4 %, nothing lost; 23 satellites"),
+    "gnss/walk_0827_gnss_1730.ubx": ("warn", "RTK fixed 65 %, RTK float 35 %, fix never lost; 25 satellites"),
+    "gnss/walk_0827_gnss_1730_sf.pos": ("warn", "RTK fixed 65 %, RTK float 35 %, fix never lost; 25 satellites"),
+    "gnss/drive_0708_gnss_1934_sf.pos": ("good", "RTK fixed 99.6 %, RTK float 0.4 %, fix never lost; 23 satellites"),
     "ulog/quadrotor_local.ulg": ("bad", "GNSS never had a fix: 926 rows, 0 satellites"),
     "cases/u3_first_receiver_dead.ulg": (
         "warn",
-        "gnss.2: single (3D) throughout, nothing lost; 14 satellites; gnss.1: ",
+        "gnss.2: single (3D) throughout, fix never lost; 14 satellites; gnss.1: ",
     ),
-    "cases/m3_zero_fix.mcap": ("warn", "first fix after 30 s, then single (3D) throughout, nothing lost"),
+    "cases/m3_zero_fix.mcap": ("warn", "first fix after 30 s, then single (3D) throughout, fix never lost"),
     "cases/f_zero_fix_first_60s.csv.gz": ("unknown", "first fix after 60 s, then fix (kind not logged) throughout"),
-    "cases/n4_pashr_kinds.nmea": ("good", "RTK fixed throughout, nothing lost; 14 satellites"),
-    "cases/m2_two_publishers.mcap": ("good", "gnss.1: single (3D) throughout, nothing lost"),
-    "cases/d12_hdop_9_9.bin": ("bad", "single (3D) throughout, nothing lost; 4 satellites"),
+    "cases/n4_pashr_kinds.nmea": ("good", "RTK fixed throughout, fix never lost; 14 satellites"),
+    "cases/m2_two_publishers.mcap": ("good", "gnss.1: single (3D) throughout, fix never lost"),
+    "cases/d12_hdop_9_9.bin": ("bad", "single (3D) throughout, fix never lost; 4 satellites"),
     "gnss/inertialsense_Serial38400.nmea": (
         "good",
         "single (3D) throughout, fix never lost, 20 of 2327 epochs missing; 10 satellites; scatter",
@@ -141,3 +143,28 @@ def test_states_of_the_walk_and_the_drive_are_those_of_their_rows() -> None:
     seconds = {one.state: one.seconds for one in drive.receiver.states}
     assert seconds == pytest.approx({"rtk_fixed": 2189 / 4, "rtk_float": 8 / 4}, abs=0.01)
     assert drive.receiver.motion is not None and drive.receiver.motion.lag_s == pytest.approx(0.126, abs=0.005)
+
+
+@pytest.mark.real_log
+def test_a_receiver_at_odds_with_itself_is_told_in_its_chapter() -> None:
+    """Its firmware writes PDOP as HDOP of GGA, accuracies as HDOP and VDOP of GSA, and no height above the sea."""
+    results = open_flight(real_log("gnss/inertialsense_Serial38400.nmea")).results
+    section = gnss(results)
+    assert section is not None
+    notes = " ".join(part.text for part in section.parts if isinstance(part, Note))
+    assert "GSA says PDOP 1.1 to 1.5, HDOP 1 to 3 and VDOP 1 to 7 in 2307 rows, which cannot be" in notes
+    assert "is the PDOP of that GSA in 2307 rows" in notes and "Altitude 0 m, geoid 1382.23 to 1389.34 m" in notes
+    found = results.answer(GnssReception)
+    assert found is not None and found.receiver.hdop is None and found.receiver.pdop == 1.2
+    assert found.receiver.motion is not None
+    assert found.receiver.motion.difference_rms_mps == pytest.approx(0.054, abs=0.001)
+
+
+@pytest.mark.real_log
+@pytest.mark.parametrize(
+    ("name", "is_advised"), [("gnss/inertialsense_Serial38400.nmea", True), ("gnss/walk_0827_gnss_1730.ubx", False)]
+)
+def test_gst_is_advised_where_sentences_claim_no_accuracy(name: str, is_advised: bool) -> None:
+    section = next_steps(open_flight(real_log(name)).results)
+    told = "" if section is None else str(section.parts)
+    assert ("the NMEA sentence GST, the accuracy that the receiver claims" in told) is is_advised

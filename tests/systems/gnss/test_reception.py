@@ -12,7 +12,7 @@ from groundstation.systems.gnss.answer import VelocityAgainstPosition
 from groundstation.systems.gnss.arrays import GnssMissing
 from groundstation.systems.gnss.examine import shortfalls_of
 from groundstation.systems.gnss.settings import GnssSettings
-from groundstation.systems.gnss.wording_answer import meaning_of, same_claims
+from groundstation.systems.gnss.wording_answer import meaning_of, memory_of, same_claims
 from groundstation.tables.phases import PhaseInterval, Phases
 from groundstation.tables.table import Flight, Table
 from tests.systems.gnss.made import (
@@ -44,7 +44,9 @@ def test_shares_are_of_time_and_not_of_rows() -> None:
     one = receiver(table(time_s, fix=kinds))
     assert shares(one)["rtk_fixed"] == pytest.approx(1.0 / 3.0, abs=0.005)
     assert [state.state for state in one.states] == ["rtk_fixed", "rtk_float"]
-    assert answer(table(time_s, fix=kinds)).sentence.startswith("RTK float 67 %, RTK fixed 33 %, nothing lost; 12 sat")
+    assert answer(table(time_s, fix=kinds)).sentence.startswith(
+        "RTK float 67 %, RTK fixed 33 %, fix never lost; 12 sat"
+    )
 
 
 def test_never_a_fix_is_the_sentence_and_bad() -> None:
@@ -72,7 +74,7 @@ def test_a_fix_at_latitude_zero_is_none() -> None:
     assert shares(one)["none"] == pytest.approx(30.0 / WHOLE_S, abs=0.005)
     assert codes(table(time_s, **gone))["no_place"] == "warn"
     assert answer(table(time_s, **gone)).sentence.startswith(
-        "first fix after 30 s, then single (3D) throughout, nothing"
+        "first fix after 30 s, then single (3D) throughout, fix never"
     )
 
 
@@ -171,6 +173,28 @@ def test_scatter_of_white_errors_is_the_sigma_and_has_no_memory() -> None:
     assert f"scatter {100.0 * stood.scatter_m:.1f} cm where 2.0 cm is claimed" in sentence
 
 
+def test_errors_of_several_durations_last_as_long_as_their_means_say() -> None:
+    """What remains of a mean is what the duration told makes of it."""
+    rng, time_s = np.random.default_rng(6), np.arange(0.0, 4000.0, 1.0)
+    place = np.zeros((len(time_s), 2))
+    for sigma_m, lasts_s in ((0.6, 8.0), (0.5, 120.0)):
+        kept, drawn = np.exp(-1.0 / lasts_s), rng.normal(0.0, sigma_m, (len(time_s), 2))
+        drift = np.zeros_like(place)
+        drift[0] = drawn[0]
+        for row in range(1, len(time_s)):
+            drift[row] = kept * drift[row - 1] + np.sqrt(1.0 - kept**2) * drawn[row]
+        place += drift
+    still = {f"velocity_{axis}_mps": np.zeros(len(time_s)) for axis in ("north", "east")}
+    stood = receiver(table(time_s, place_m=place, **still)).standstill
+    assert stood is not None and stood.correlation_s is not None
+    assert stood.averaged_s == 512.0 and stood.averaged_scatter_m is not None
+    told_m = stood.scatter_m * np.sqrt(2.0 * stood.correlation_s / stood.averaged_s)
+    assert told_m >= stood.averaged_scatter_m * 0.999
+    true_s = (0.36 * 8.0 + 0.25 * 120.0) / 0.61  # durations by their power
+    assert stood.correlation_s == pytest.approx(true_s, rel=0.5)
+    assert "means over 8:32 min scatter by" in memory_of(stood)
+
+
 def two_kinds(**columns: object) -> Table:
     """A stand of 30 s RTK fixed with 0.01 m, then 30 s float with 0.04 m, and a drive in float."""
     time_s = times()
@@ -221,6 +245,8 @@ def test_hdop_of_sentences_is_that_of_the_receiver() -> None:
     assert receiver(table(time_s), sentences(time_s, "raw.GNGGA", 0.62)).hdop == 0.8, "its own comes first"
     assert receiver(bare, sentences(time_s + 1000.0, "raw.GNGGA", 0.62)).hdop is None, "of other epochs"
     assert codes(bare, sentences(time_s, "raw.GNGGA", 4.0))["hdop_beyond"] == "warn"
+    with_pdop = table(time_s, hdop=None, pdop=np.full(len(time_s), 0.62))
+    assert receiver(with_pdop, sentences(time_s, "raw.GNGGA", 0.62)).hdop is None, "it is the PDOP"
     other = replace(table(time_s, hdop=None), topic="gnss.2")
     two = replace(bare, topic="gnss.1")
     assert receiver(two, other, sentences(time_s, "raw.GNGGA", 0.62)).hdop is None, "of which receiver is not known"
@@ -321,6 +347,20 @@ def test_without_noise_position_and_velocity_agree() -> None:
     assert one.jumps_found == 0 and one.motion is not None
     assert one.motion.difference_rms_mps < 0.02, "of the trapezoid in a circle"
     assert one.motion.lag_s == pytest.approx(0.0, abs=0.005)
+
+
+def test_places_in_coarse_steps_differ_from_a_velocity_of_zero() -> None:
+    """Most steps are of nothing: the others are no outliers."""
+    time_s = times(0.5)
+    moved = np.isin(np.arange(len(time_s)) % 10, (3, 4, 5))  # there and back: two steps of ten
+    still = {f"velocity_{axis}_mps": np.zeros(len(time_s)) for axis in ("north", "east")}
+    one = receiver(table(time_s, place_m=np.column_stack([0.02 * moved, np.zeros(len(time_s))]), **still))
+    assert one.motion is not None and one.jumps_found == 0
+    assert one.motion.difference_rms_mps == pytest.approx(0.04 * np.sqrt(0.2), rel=0.01)
+    far = np.column_stack([0.02 * moved + 300.0 * (time_s == 90.0), np.zeros(len(time_s))])
+    one = receiver(table(time_s, place_m=far, **still))
+    assert one.motion is not None and one.jumps_found == 2
+    assert one.motion.difference_rms_mps == pytest.approx(0.04 * np.sqrt(0.2), rel=0.01), "without the jumps"
 
 
 @pytest.mark.parametrize("step_s", [0.1, 1.0])
@@ -462,5 +502,5 @@ def test_a_row_that_is_late_is_no_missing_epoch() -> None:
     time_s = np.arange(0.0, 200.0, 0.5)
     time_s[[40, 90]] += 0.3
     found = reception(table(time_s))
-    assert found.answer.receiver.missed_epochs == 0 and "nothing lost" in found.answer.sentence
+    assert found.answer.receiver.missed_epochs == 0 and "fix never lost; 12 sat" in found.answer.sentence
     assert not any(isinstance(figure, GnssMissing) for figure in found.answer.figures)
