@@ -1,4 +1,4 @@
-"""Lift-off and touch-down by altitude: where a flight leaves the ground that is proven before it, and meets that after.
+"""Lift-off and touch-down by altitude: where a flight leaves and meets proven ground.
 
 The ground may rise along a runway: the line through the roll, carried under the flight, is the ground there. What still
 sinks against it does not touch it.
@@ -56,7 +56,7 @@ def between_lift_off_and_touch_down(
 
 
 def _beside(ground: BoolArray, edge: int, step: int) -> NDArray[np.intp]:
-    """Return the rows of proven ground from its edge away from the flight, at most ``ROLLED_S`` of them."""
+    """Return the rows of proven ground from its edge on, at most ``ROLLED_S`` of them."""
     rows = edge + step * np.arange(round(ROLLED_S * RATE_HZ))
     rows = rows[(rows >= 0) & (rows < len(ground))]
     air = np.flatnonzero(~ground[rows])
@@ -69,9 +69,9 @@ def _lifted_m(slow: BoolArray) -> FloatArray:
 
 
 def _height_m(motion: Motion, altitude_m: FloatArray, rolled: NDArray[np.intp], settings: GroundSettings) -> FloatArray:
-    """Return the height by each source above the line through the ground that was rolled over, shape (k, n).
+    """Return the height by each source above the ground, shape (k, n).
 
-    The line is carried no farther than it was rolled over, level from there.
+    The ground is the line through what was rolled over, carried no farther than it was rolled over, level from there.
     """
     level = rolled[: round(LEVEL_S * RATE_HZ)]
     slope = _slopes(motion.path_m[rolled], altitude_m[:, rolled], settings)
@@ -88,7 +88,7 @@ def _sink_mps(height_m: FloatArray) -> FloatArray:
 
 
 def _slopes(path_m: FloatArray, altitude_m: FloatArray, settings: GroundSettings) -> FloatArray:
-    """Return the slope of the ground by each source along the path, shape (k,), metres per metre.
+    """Return the slope of the ground by each source, shape (k,), metres per metre of path.
 
     Least squares, weighed against the slopes of runways: a drift of the altitude looks like a slope, the steeper the
     slower it was rolled over.

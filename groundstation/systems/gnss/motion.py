@@ -36,9 +36,10 @@ class Steps(NamedTuple):
 
 
 def steps_of(one: ReceiverRows, settings: GnssSettings) -> Steps:
-    """Compare each step of the position with the mean velocity of its ends, less what its delay explains.
+    """Compare each step of the position with the mean velocity of its ends.
 
-    Without velocities, with the step before it: then only jumps are found.
+    What a delay of the velocity explains is taken off. Without velocities, with the step before it: then only jumps are
+    found.
     """
     count = len(one.time_s)
     beyond = np.full((count, 2), np.nan)
@@ -121,9 +122,9 @@ def _is_usual(size: FloatArray) -> BoolArray:
 
 
 def _middle_slope(x: FloatArray, y: FloatArray) -> float:
-    """Return the slope of the line through zero with the least sum of absolute differences; 0 where x is 0 throughout.
+    """Return the slope through zero with the least sum of absolute differences.
 
-    It is the weighted median of ``y / x``, which some jumps do not move.
+    0 where x is 0 throughout. It is the weighted median of ``y / x``, which some jumps do not move.
     """
     x, y = (values[x.ravel() != 0.0] for values in (x.ravel(), y.ravel()))
     if not x.size:
