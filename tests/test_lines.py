@@ -1,15 +1,20 @@
 """Lines of a run: told as each flight is done, the verdict first, no longer than a screen is wide."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from groundstation.base.clock import StepEntry
 from groundstation.base.failures import Failure
 from groundstation.cli import completion
 from groundstation.cli.lines import LONGEST, Lines, line_of
+from groundstation.pipeline.one_flight.line import line_of_results
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event
+from groundstation.systems import systems
 from tests.conftest import SAMPLES
+from tests.report_example import example
 from tests.test_cli import groundstation
 
 DONE = Outcome("logs/a.csv", "done", "accept: +1 deg", flight_id="A_1")
@@ -56,6 +61,19 @@ def test_a_line_is_no_longer_than_a_screen() -> None:
         for identity in ("", "20260504T060000Z_SIM-1_101"):
             line = line_of(Outcome("a", "data_lost", words * 200, flight_id=identity, was_finished=True))
             assert len(line) <= LONGEST and line.endswith(identity)
+
+
+@pytest.mark.parametrize(
+    ("sizes_s", "told"),
+    [((-3.0,), "; clock step -3 s"), ((-3.0, 7200.0), "; 2 clock steps, up to +2:00:00"), ((), "")],
+)
+def test_a_step_of_the_clock_is_told(sizes_s: tuple[float, ...], told: str) -> None:
+    kept = {"mistake": "", "record_index": 24, "records_before": 18, "set_s": -4.0, "shift_of_earlier_s": -4.0}
+    steps = tuple(StepEntry(kind="backward" if size < 0.0 else "forward", size_s=size, **kept) for size in sizes_s)  # type: ignore[arg-type]
+    plain = example()
+    stepped = replace(plain, clock=replace(plain.clock, steps=steps))
+    expected = line_of_results(plain, systems()).replace("; not assessable", f"{told}; not assessable")
+    assert line_of_results(stepped, systems()) == expected
 
 
 def test_a_run_tells_the_verdict_first(tmp_path: Path) -> None:

@@ -105,6 +105,19 @@ def _cut(ledger: Ledger) -> str:
     )
 
 
+def clock_steps(results: FlightResults) -> str:
+    """Return the step of the recorder's clock; empty without one.
+
+    Of several it is their number and the greatest.
+    """
+    sizes = [one.size_s for one in results.clock.steps]
+    if not sizes:
+        return ""
+    size_s = max(sizes, key=abs)
+    told = f"{size_s:+.3g} s" if abs(size_s) < FEW_S else f"{'-' if size_s < 0.0 else '+'}{clock_text(size_s)}"
+    return f"clock step {told}" if len(sizes) == 1 else f"{len(sizes)} clock steps, up to {told}"
+
+
 def great_loss(results: FlightResults) -> str:
     """Return the loss that comes before every answer, empty where there is none.
 

@@ -15,14 +15,13 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.base.units import NS_PER_S
 from groundstation.base.words import counted
-from groundstation.tables.detector import Detection, GroundSettings, detect_ground, lasting
+from groundstation.tables.detector import Detection, GroundSettings, detect_ground
+from groundstation.tables.lift_off import between_lift_off_and_touch_down
 from groundstation.tables.likely import likely_of
 from groundstation.tables.motion import (
     RATE_HZ,
     Motion,
     grid_size,
-    known_mean,
-    largest_over_sources,
     motion_of,
     running_mean,
     runs,
@@ -65,8 +64,6 @@ STEP_NS = round(NS_PER_S / RATE_HZ)
 LEAST_COVERAGE = 0.5  # share of the flight for which a flag must speak
 RUN_SHARE = 0.25  # a run begins and a roll ends at this share of the speed at lift-off and touch-down
 SLOWEST_RUN_MPS = 3.0  # an aircraft that lifts off slower made no run
-LIFTED_M = 1.5  # height at which a lift-off is seen, in smoothed altitudes
-CARRIED_M, CARRIED_S = 5.0, 5.0  # up to that height what is too slow to fly for so long is carried
 SHORTEST_STANDSTILL_S = 3.0
 
 
@@ -114,7 +111,7 @@ class Phases:
     Parameters
     ----------
     intervals : tuple of PhaseInterval
-        What is proven, and ``unknown`` elsewhere: all that a method may rest on.
+        What is proven, runs and rolls whole, and ``unknown`` elsewhere: all that a method may rest on.
     method : str
     likely : tuple of PhaseInterval
         The same with what is likely in place of ``unknown``: for people.
@@ -186,7 +183,7 @@ def flight_phases(flight: Flight, *, settings: GroundSettings | None = None) -> 
     (:func:`ground_mask`). Airborne is weight off wheels, or, by the detector, everything between lift-off and
     touch-down around sure flight, both read off the altitude. A take-off run is the stretch before lift-off that is
     faster than a quarter of the speed there, a landing roll the like after touch-down: these two may hold samples that
-    are not proven ground. All else is unknown in ``intervals``, and in ``likely`` what
+    are not proven ground, which ``likely`` tells apart. All else is unknown in ``intervals``, and in ``likely`` what
     :func:`groundstation.tables.likely.likely_of` makes of it.
     """
     with _evidence_of(flight, settings) as evidence:
@@ -203,8 +200,9 @@ def flight_phases(flight: Flight, *, settings: GroundSettings | None = None) -> 
         )
         label = _labels(evidence, found.ground, found.airborne, travel.speed_mps, rolling)
         label[found.moving & (label == UNKNOWN)] = MOVING
-        is_proven = proven != UNKNOWN
-        label[is_proven] = proven[is_proven]
+        is_known = proven != UNKNOWN
+        label[is_known] = proven[is_known]
+        is_proven = is_known & (evidence.ground | (proven == AIRBORNE))  # the rest of a run or roll is only likely
         label[(label == rolling) & ~np.isfinite(travel.speed_mps)] = SOMEWHERE_ON_GROUND
         return Phases(
             _intervals(flight, proven, np.ones(size, dtype=bool)),
@@ -328,7 +326,7 @@ class _Evidence:
             return np.zeros(len(self.grid_ns), dtype=bool)
         if self.contact is not None and not self.against_flag:
             return _up_to_the_ground(held(self.contact, self.grid_ns)[1], self.ground)
-        return _between_lift_off_and_touch_down(self.motion, self.ground, self.detection)
+        return between_lift_off_and_touch_down(self.motion, self.ground, self.detection, self.settings)
 
 
 _KEPT: dict[tuple[int, GroundSettings], _Evidence] = {}  # by the identity of a flight that is there
@@ -384,39 +382,3 @@ def _up_to_the_ground(denied: BoolArray, ground: BoolArray) -> BoolArray:
         if is_between and end - start <= LONGEST_HOLD_S * RATE_HZ:
             airborne[start:end] = True
     return airborne
-
-
-def _between_lift_off_and_touch_down(motion: Motion, ground: BoolArray, detection: Detection) -> BoolArray:
-    """Widen sure flight to where its altitude leaves and meets that of the ground.
-
-    The ground is the one proven before and after. A little above it, and slower than it ever was in sure flight, it
-    does not fly yet: it is carried to its launch.
-    """
-    sure, slow = detection.airborne, lasting(motion.speed_mps < detection.speed_limit_mps, CARRIED_S)
-    airborne = np.zeros(len(ground), dtype=bool)
-    altitude = running_mean(motion.all_altitudes_m, 1.0)
-    near = round(5.0 * RATE_HZ)
-    for start, end in runs(~ground):
-        flying = start + np.flatnonzero(sure[start:end])
-        if not flying.size:
-            continue
-        lift_off, touch_down = int(flying[0]), int(flying[-1]) + 1
-        if start > 0:
-            low = _low_rows(
-                altitude[:, start:lift_off], altitude[:, max(start - near, 0) : start], slow[start:lift_off]
-            )
-            lift_off = start + (int(low[-1]) + 1 if low.size else 0)
-        if end < len(ground):
-            low = _low_rows(altitude[:, touch_down:end], altitude[:, end : end + near], slow[touch_down:end])
-            touch_down = touch_down + int(low[0]) if low.size else end
-        airborne[lift_off:touch_down] = True
-    return airborne
-
-
-def _low_rows(altitude_m: FloatArray, ground_m: FloatArray, slow: BoolArray) -> NDArray[np.intp]:
-    """Return rows no more than LIFTED_M above the mean altitude of the ground.
-
-    Slow rows may be CARRIED_M above it.
-    """
-    height_m = largest_over_sources(altitude_m - known_mean(ground_m)[:, None])
-    return np.flatnonzero(height_m <= np.where(slow, CARRIED_M, LIFTED_M))

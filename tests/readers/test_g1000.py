@@ -49,7 +49,14 @@ def test_units_signs_and_derived_fields(tmp_path: Path) -> None:
     assert log.values("ins", "accel_y_mps2") == [pytest.approx(0.980665)]
     assert log.values("ins", "accel_z_mps2") == [pytest.approx(-1.5 * 9.80665)]  # normal acceleration leaves 1 g out
     assert log.values("baro", "pressure_altitude_m") == [pytest.approx(30.48)]  # the setting is the standard one
-    assert log.values("raw.g1000", "GPSfix") == ["3D"] and log.values("raw.g1000", "amp1") == [1.0]
+    assert log.values("gnss", "fix") == ["3d"] and log.values("raw.g1000", "amp1") == [1.0]
+
+
+def test_every_word_for_the_kind_of_fix(tmp_path: Path) -> None:
+    words = ["NoSoln", "2D", "2D-", "2DDiff", "3D", "3D-", "3DDiff"]
+    rows = [row(f"12:00:{at:02d}").replace(" 3D,", f" {word},") for at, word in enumerate(words)]
+    expected = ["none", "2d", "2d", "dgnss", "3d", "3d", "dgnss"]
+    assert Read(write(tmp_path, *rows)).values("gnss", "fix") == expected
 
 
 def test_both_date_formats_headers_in_the_middle_and_rows_without_time(tmp_path: Path) -> None:
@@ -172,7 +179,8 @@ def test_variation_is_east_positive_by_positions_and_by_the_magnetic_model(name:
     found = survey(registry.read(path))
     gnss = batches(path, found, "gnss")
     latitude, longitude = column(gnss, "latitude_deg"), column(gnss, "longitude_deg")
-    north, east = north_east_m(latitude, longitude, float(latitude[0]), float(longitude[0]))
+    first = int(np.flatnonzero(np.isfinite(latitude))[0])  # the rows before it say that there is no fix
+    north, east = north_east_m(latitude, longitude, float(latitude[first]), float(longitude[first]))
     moved = direction_of(north[2:] - north[:-2], east[2:] - east[:-2])
     fast = column(gnss, "ground_speed_mps")[1:-1] > 30.0
     errors = wrap_180(moved - column(gnss, "track_deg")[1:-1])[fast]

@@ -247,10 +247,11 @@ def test_nothing_is_decided_by_what_does_not_move() -> None:
 def test_case_e2_and_e3() -> None:
     from tests.real_logs import real_log
 
-    for name in ("cases/e2_g3x_touch_magvar.csv", "cases/e3_g5.csv"):
+    for name, fix in (("cases/e2_g3x_touch_magvar.csv", "dgnss"), ("cases/e3_g5.csv", "3d")):
         found = Read(real_log(name))
         assert one(found, "gnss", "track_deg") == 90.0 and one(found, "ins", "true_heading_deg") == 90.0
         assert motion(found) == (0.0, 12.0)
+        assert set(found.values("gnss", "fix")) == {fix}
 
 
 def test_text_of_inertial_explorer_is_not_misread(tmp_path: Path) -> None:

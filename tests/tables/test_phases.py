@@ -165,7 +165,10 @@ def test_phases_of_a_light_aircraft(seed: int) -> None:
     )
     lift_off = truth.time_s[np.argmin(truth.contact)]
     touch_down = truth.time_s[len(truth.contact) - np.argmin(truth.contact[::-1])]
-    for phases, tolerance_s in ((by_detector, 6.0), (by_wheels, 0.3)):  # a float of 6 s within half a metre is not seen
+    for phases, tolerance_s in (
+        (by_detector, 7.5),
+        (by_wheels, 0.3),
+    ):  # a float of 7 s below 2.2 m, altitudes off by 0.7
         assert order_of(phases, 6.0) == expected
         (air,) = (interval for interval in phases.intervals if interval.phase == "airborne")
         assert air.start_s == pytest.approx(lift_off, abs=tolerance_s)
@@ -175,6 +178,28 @@ def test_phases_of_a_light_aircraft(seed: int) -> None:
         *("unknown", "standstill", "airborne", "unknown", "unknown"),
     ]
     assert by_wheels.seconds_in("airborne") == pytest.approx(touch_down - lift_off, abs=0.5)
+
+
+@pytest.mark.parametrize("slope", [-0.01, 0.01])
+@pytest.mark.parametrize("rates_hz", [(50.0, 5.0), (50.0, 1.0)])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_flare_over_a_sloping_runway_is_flown(seed: int, rates_hz: tuple[float, float], slope: float) -> None:
+    truth = light_aircraft()
+    touch_down = len(truth.contact) - int(np.argmin(truth.contact[::-1]))
+    along_m = np.cumsum(truth.speed_mps) * STEP_S
+    along_m -= along_m[touch_down] - 900.0  # the runway begins 900 m before the touch-down, and is 1500 m long
+    flight = flight_of(truth, seed=seed, rates_hz=rates_hz, altitude_drift_m=slope * np.clip(along_m, 0.0, 1500.0))
+    phases = flight_phases(flight)
+    (air,) = (interval for interval in phases.intervals if interval.phase == "airborne")
+    assert np.interp(air.end_s, truth.time_s, truth.height_m) < 3.0  # 1.5 m, the error of altitudes and of the slope
+    assert air.end_s < truth.time_s[touch_down] + 3.0
+    for one in phases.likely:
+        rows = (truth.time_s >= one.start_s) & (truth.time_s < one.end_s)
+        assert truth.contact[rows].all() or one.phase == "airborne" or not one.is_proven, one
+    (run,) = (one for one in phases.intervals if one.phase == "landing roll")
+    assert run.start_s == air.end_s
+    parts = [(one.is_proven, one.end_s) for one in phases.likely if one.phase == "landing roll"]
+    assert [is_proven for is_proven, _ in parts] == [False, True] and parts[1][1] == run.end_s
 
 
 def test_turning_the_world_or_shifting_time_changes_nothing() -> None:
@@ -535,16 +560,16 @@ def test_real_cruise_with_weight_off_wheels_has_no_ground() -> None:
 
 @pytest.mark.real_log
 @pytest.mark.parametrize(
-    ("name", "lift_off_s", "touch_down_s"),  # by eye: indicated speed, pitch and altitude
-    [("log_210623_141501_TEST1.csv", 843.0, 4350.0), ("log_220417_125002_LFQA.csv", 671.0, 2667.0)],
+    ("name", "lift_off_s", "touch_down_s"),  # by eye: pitch and altitude; touch-down of the analysis of landings
+    [("log_210623_141501_TEST1.csv", 843.0, 4355.5), ("log_220417_125002_LFQA.csv", 671.0, 2668.4)],
 )
 def test_real_light_aircraft_at_one_hertz(name: str, lift_off_s: float, touch_down_s: float) -> None:
     flight = real_flight(f"g1000/{name}")
     phases = flight_phases(flight)
     assert_covers(phases, flight)
     (air,) = (interval for interval in phases.intervals if interval.phase == "airborne")
-    assert air.start_s == pytest.approx(lift_off_s, abs=3.0)
-    assert air.end_s == pytest.approx(touch_down_s, abs=6.0)
+    assert air.start_s == pytest.approx(lift_off_s, abs=1.5)
+    assert air.end_s == pytest.approx(touch_down_s, abs=2.0)
     table = flight["gnss"]
     mask, time_s = ground_mask(flight, table.time_ns).mask, flight.time_s("gnss")
     speed = np.hypot(table.values("velocity_north_mps"), table.values("velocity_east_mps"))
@@ -558,7 +583,8 @@ def test_real_light_aircraft_that_only_taxied(name: str) -> None:
     flight = real_flight(f"g1000/{name}")
     phases = flight_phases(flight)
     assert set(phases.phase) == {"unknown", "standstill", "taxi"}
-    fixed_s = flight.duration_s - flight.time_s("gnss")[0]
+    first = int(np.argmax(flight["gnss"].valid("latitude_deg")))  # the rows before it say that there is no fix
+    fixed_s = flight.duration_s - flight.time_s("gnss")[first]
     assert phases.seconds_in("standstill") + phases.seconds_in("taxi") > 0.9 * fixed_s
 
 

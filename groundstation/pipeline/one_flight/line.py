@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from groundstation.base.failures import attempt
 from groundstation.chapters.by_answer import answers_in_order, loss_above
 from groundstation.results.flight import FlightResults
-from groundstation.results.recorded import recorded, simulated
+from groundstation.results.recorded import clock_steps, recorded, simulated
 
 if TYPE_CHECKING:
     from groundstation.systems.system import Systems
@@ -17,7 +17,7 @@ DATA_LOST = "data lost"
 def line_of_results(results: FlightResults, systems: "Systems") -> str:
     """Return the results of a flight in one line, the answer first that its page opens with.
 
-    Before all stands that a simulator made the log.
+    Before all stands that a simulator made the log, behind the first answer that the recorder's clock stepped.
     """
     return "; ".join(filter(None, (simulated(results), _told(results, systems))))
 
@@ -29,7 +29,8 @@ def _told(results: FlightResults, systems: "Systems") -> str:
         return _without_answer(results)
     order = answers_in_order(results, systems.chapters)
     names = dict.fromkeys(name for one in order for name in one.analyses if name in texts)
-    told = [texts[name] for name in names | texts]
+    first_told, *others = (texts[name] for name in names | texts)
+    told = [first_told, *filter(None, [clock_steps(results)]), *others]
     claims = [one.section.claim for one in order if not texts.keys().isdisjoint(one.analyses)]
     first = claims[0] if claims else None
     if loss := loss_above(results, first):
@@ -59,8 +60,9 @@ def verdict_first(verdict: str, text: str) -> str:
 
 
 def _without_answer(results: FlightResults) -> str:
+    told = "; ".join(filter(None, (recorded(results), clock_steps(results))))
     if not results.not_assessable:
-        return recorded(results)
+        return told
     first, *others = results.not_assessable
     more = f" and {len(others)} more" if others else ""
-    return f"{recorded(results)}; not assessable: {first.analysis} ({first.reason}){more}"
+    return f"{told}; not assessable: {first.analysis} ({first.reason}){more}"

@@ -13,7 +13,7 @@ from groundstation.results.files import SavedFlight
 from groundstation.results.roles import ErrorsAlongTheFlight
 
 EVENTS: tuple[Event, ...] = get_args(Event)
-AT_REST, UNKNOWN, AIRBORNE = "standstill", "unknown", "airborne"
+AT_REST, UNKNOWN, AIRBORNE, TAKE_OFF_RUN = "standstill", "unknown", "airborne", "take-off run"
 NO_GNSS = "no GNSS"
 
 
@@ -54,7 +54,8 @@ def events_of(saved: SavedFlight) -> dict[Event, float]:
     """Return the events of a flight that others can be aligned on, in flight seconds.
 
     ``utc`` is no moment and not among them. The first movement follows a standstill and the lift-off something else
-    than an unknown phase: a log that begins later shows neither. An outage is the first interval without GNSS.
+    than an unknown phase: a log that begins later shows neither. The last part of a run need not be proven. An outage
+    is the first interval without GNSS.
     """
     found: dict[Event, float] = {"start": 0.0}
     phases = saved.rows_of(PhaseSpans)
@@ -64,7 +65,8 @@ def events_of(saved: SavedFlight) -> dict[Event, float]:
         if moving and names[moving - 1] == AT_REST and math.isfinite(start_s[moving]):
             found["first-movement"] = start_s[moving]
         flying = names.index(AIRBORNE) if AIRBORNE in names else 0
-        if flying and names[flying - 1] != UNKNOWN and math.isfinite(start_s[flying]):
+        is_shown = names[flying - 1] != UNKNOWN or phases.phase[flying - 1] == TAKE_OFF_RUN
+        if flying and is_shown and math.isfinite(start_s[flying]):
             found["lift-off"] = start_s[flying]
     outage_s = _first_outage_s(saved)
     if outage_s is not None:

@@ -26,7 +26,8 @@ BY_PHASE = ("rtk_fixed", "rtk_float", "ppp")
 class Steps(NamedTuple):
     """Steps of the position beyond those of the velocity, one a row; NaN where there is none.
 
-    ``beyond_m`` has shape (n, 2), north and east, and belongs to the later row of a step.
+    ``beyond_m`` has shape (n, 2), north and east, and belongs to the later row of a step. A velocity counts at its own
+    time where its delay is known.
     """
 
     beyond_m: FloatArray
@@ -38,7 +39,8 @@ class Steps(NamedTuple):
 def steps_of(one: ReceiverRows, settings: GnssSettings) -> Steps:
     """Compare each step of the position with the mean velocity of its ends.
 
-    Without velocities, with the step before it: then only jumps are found.
+    What a delay of the velocity explains is taken off. Without velocities, with the step before it: then only jumps are
+    found.
     """
     count = len(one.time_s)
     beyond = np.full((count, 2), np.nan)
@@ -55,6 +57,8 @@ def steps_of(one: ReceiverRows, settings: GnssSettings) -> Steps:
         usable = has_velocity
         beyond[1:][usable] = (step_m - velocity * step_s[:, None])[usable]
         answer = _motion(one, beyond[1:], step_s, usable, settings)
+        late_m = (answer.lag_s or 0.0) * np.diff(one.velocity_mps[:, :2], axis=0)  # a turn is no jump
+        beyond[1:] -= late_m
     else:
         speed = np.where(usable[:, None], step_m / np.where(step_s > 0.0, step_s, 1.0)[:, None], np.nan)
         expected = np.vstack([np.full((1, 2), np.nan), speed[:-1]]) * step_s[:, None]
@@ -68,15 +72,14 @@ def _motion(
 ) -> VelocityAgainstPosition:
     """Return the difference in velocity, and the delay that explains it by the accelerations.
 
-    A velocity that is late by ``lag`` misses ``lag * acceleration``.
+    A velocity that is late by ``lag`` misses ``lag * acceleration``. Outliers, as jumps are, are told by what the delay
+    leaves: a turn of a straight flight is none.
     """
     difference = beyond_m[usable] / step_s[usable, None]
     seconds = float(step_s[usable].sum())
-    size = np.hypot(difference[:, 0], difference[:, 1])
-    kept = _is_usual(size)
-    rms = float(np.sqrt(np.mean(size[kept] ** 2)))
     acceleration = (np.diff(one.velocity_mps[:, :2], axis=0) / step_s[:, None])[usable]
-    kept &= np.isfinite(acceleration).all(axis=1)
+    kept = _is_usual(np.linalg.norm(difference - _middle_slope(acceleration, difference) * acceleration, axis=1))
+    rms = float(np.sqrt(np.mean(np.sum(difference[kept] ** 2, axis=1))))
     lag_s, sigma_s = slope(acceleration[kept].ravel(), difference[kept].ravel())
     is_known = np.isfinite(sigma_s) and sigma_s <= settings.lag_sigma_max_s
     left = difference[kept] - (lag_s if is_known else 0.0) * acceleration[kept]
@@ -129,6 +132,19 @@ def _usual(size: FloatArray) -> float:
     return MAD_TO_SIGMA * float(np.median(beyond)) if beyond.size else 0.0
 
 
+def _middle_slope(x: FloatArray, y: FloatArray) -> float:
+    """Return the slope through zero with the least sum of absolute differences.
+
+    0 where x is 0 throughout. It is the weighted median of ``y / x``, which some jumps do not move.
+    """
+    x, y = (values[x.ravel() != 0.0] for values in (x.ravel(), y.ravel()))
+    if not x.size:
+        return 0.0
+    order = np.argsort(y / x)
+    weight = np.cumsum(np.abs(x[order]))
+    return float((y / x)[order][np.searchsorted(weight, 0.5 * weight[-1])])
+
+
 def slope(x: FloatArray, y: FloatArray) -> tuple[float, float]:
     """Return the slope of a line through zero, and its sigma.
 
@@ -151,8 +167,11 @@ def slope(x: FloatArray, y: FloatArray) -> tuple[float, float]:
 def _jumps(
     one: ReceiverRows, beyond_m: FloatArray, step_s: FloatArray, settings: GnssSettings
 ) -> tuple[tuple[PositionJump, ...], int]:
-    """Return the largest steps far beyond the usual difference, and how many there are."""
-    size = _beyond_jitter(one, beyond_m, settings)
+    """Return the largest steps far beyond the usual difference, and how many there are.
+
+    Places that are logged in steps may be off by one of them in latitude and in longitude.
+    """
+    size = np.maximum(_beyond_jitter(one, beyond_m, settings) - np.sqrt(2.0) * one.resolution_m, 0.0)
     finite = np.isfinite(size)
     if np.count_nonzero(finite) < LEAST_STEPS:
         return (), 0

@@ -205,8 +205,8 @@ def steps(results: FlightResults, topic: str) -> Plot | None:
     return Plot(
         f"gnss.steps.{topic}",
         f"Steps of the position{_of(results, topic)}",
-        "Size of each step of the position less the one that the velocity gives; without velocities, less the step "
-        "before it. A jump stands out.",
+        "Size of each step of the position less the one that the velocity gives, its delay taken off; without "
+        "velocities, less the step before it. A jump stands out.",
         "Steps of the position beyond the velocity over flight time.",
         one_panel(Panel(marks, time_axis(*span(mine.time_s)), y, legend=""), PANEL_MM),
         ("gnss_quality",),

@@ -139,7 +139,8 @@ def _figures(one: Approach) -> tuple[tuple[str, str, str], ...]:
 
 
 def _headline(answer: LandingResult) -> str:
-    return "; ".join(f"{_name(one)}: {_verdict(one).text}" for one in answer.approaches[:3])
+    downs = [(one, f", touchdown {one.touchdown.moment}" if one.touchdown else "") for one in answer.approaches[:3]]
+    return "; ".join(f"{_name(one)}: {_verdict(one).text}{down}" for one, down in downs)
 
 
 def _name(one: Approach) -> str:

@@ -7,6 +7,8 @@ import numpy as np
 
 from groundstation.base.angles import wrap_180
 from groundstation.base.geodesy import continuous_longitude_deg
+from groundstation.base.timescales import utc_ns_to_iso
+from groundstation.base.units import NS_PER_S
 from groundstation.results.roles import StatesAlongTheFlight
 from groundstation.systems.landing.answer import RunwayUsed
 from groundstation.systems.landing.evidence import SLOWEST_MPS, Evidence, evidence_of
@@ -77,6 +79,7 @@ def touchdown_of(
         time_s=at_s,
         time_sigma_s=final.end.sigma_s,
         found_by=final.end.found_by,
+        time_utc=utc_ns_to_iso(flight.start_ns + round(at_s * NS_PER_S), 1) if flight.has_utc else None,
         confidence95_s=None if evidence is None else evidence.confidence95_s,
         latitude_deg=latitude,
         longitude_deg=longitude,

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from groundstation.base.words import clock_text
 from groundstation.results.frames import Brief
 
 SINK_S = 1.0  # before the touchdown, over which the sink rate is taken
@@ -87,6 +88,8 @@ class Touchdown(Brief):
     ----------
     time_s, time_sigma_s : float
         Flight time, and its sigma (of the wider side of the interval).
+    time_utc : str or None
+        The same as date and time of day; None where the log has no UTC.
     confidence95_s : (float, float) or None
         Interval of the time; None where nothing but the phases shows it.
     found_by : str
@@ -121,6 +124,7 @@ class Touchdown(Brief):
     peak_load_g: float | None
     rollout_course_deg: float | None
     by_states: TouchdownByStates | None = None
+    time_utc: str | None = None  #: Date and time of day of the first contact, UTC; null where the log has none.
     confidence95_s: tuple[float, float] | None = None
     place_sigma_m: float | None = None
     sink_rate_sigma_mps: float | None = None  #: Standard deviation of the sink rate.
@@ -129,3 +133,8 @@ class Touchdown(Brief):
     runway_slope_sigma: float | None = None  #: Standard deviation of the slope.
     witnesses: tuple[Witness, ...] = ()
     second_contacts: tuple[SecondContact, ...] = ()  #: Bounces, and struts that rebound.
+
+    @property
+    def moment(self) -> str:
+        """Time of day to a second, ``13:33:15Z``; without UTC the flight time, ``44:34``."""
+        return clock_text(self.time_s) if self.time_utc is None else f"{self.time_utc[11:19]}Z"

@@ -20,7 +20,10 @@ _BRACKETS = re.compile(r" \([^()]*\)")  # within which there is no room for brac
 
 
 def line_of_approaches(answer: LandingResult) -> str:
-    """Return the approaches of a flight in a line, the last landing first."""
+    """Return the approaches of a flight in a line, the last landing first.
+
+    Its touchdown stands behind the others.
+    """
     if answer.last is None:
         return ""
     others = Counter(
@@ -32,7 +35,8 @@ def line_of_approaches(answer: LandingResult) -> str:
     ]
     more = sum(list(others.values())[MOST_OF_A_LINE:])
     also = [*also[:MOST_OF_A_LINE], *([counted(more, "further approach", "further approaches")] if more else [])]
-    return "; ".join((_told(answer.last), *also))
+    down = answer.last.touchdown
+    return "; ".join((_told(answer.last), *also, *([] if down is None else [f"touchdown {down.moment}"])))
 
 
 def _told(one: Approach) -> str:

@@ -412,6 +412,33 @@ def test_a_wrong_time_stamp_is_told_from_a_wrong_place() -> None:
     assert jump.size_m == pytest.approx(10.0, abs=0.1) and jump.time_shift_s == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.parametrize("jump_m", [0.0, 5.0])
+def test_a_turn_with_a_late_velocity_is_no_jump_and_hides_none(jump_m: float) -> None:
+    """A light aircraft that flies straight for long and turns twice, with a velocity half a second late."""
+    time_s = times(1.0, 400.0)
+    turning = ((time_s > 100.0) & (time_s < 110.0)) | ((time_s > 300.0) & (time_s < 315.0))
+    heading = np.cumsum(np.where(turning, np.deg2rad(6.0), 0.0))
+    velocity = 45.0 * np.column_stack([np.cos(heading), np.sin(heading)])
+    before = np.vstack([velocity[:1], velocity[:-1]])
+    place = np.cumsum(0.5 * (velocity + before), axis=0)
+    place += np.random.default_rng(3).normal(0.0, 0.1, place.shape)
+    place[time_s >= 305.0] += (jump_m, 0.0)  # across: it flies east there
+    late = 0.5 * (velocity + before)
+    one = receiver(table(time_s, place_m=place, velocity_north_mps=late[:, 0], velocity_east_mps=late[:, 1]))
+    assert one.motion is not None and one.motion.lag_s is not None and one.motion.lag_s > 0.4
+    assert [jump.time_s for jump in one.jumps] == ([305.0] if jump_m else [])
+    assert [jump.size_m for jump in one.jumps] == pytest.approx([jump_m] if jump_m else [], abs=0.6)
+
+
+def test_places_logged_in_coarse_steps_do_not_jump() -> None:
+    """A receiver that stands for most of the log, its places in steps of 4 m."""
+    exact = table(times(whole_s=100.0))
+    step_deg = 4e-5
+    rounded = {name: np.round(exact.values(name) / step_deg) * step_deg for name in ("latitude_deg", "longitude_deg")}
+    one = receiver(table(times(whole_s=100.0), **rounded))
+    assert one.motion is not None and one.jumps_found == 0
+
+
 def test_jumps_without_velocities() -> None:
     time_s = times()
     place = motion(time_s)[0]

@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from groundstation.base.clock import Clock, StepEntry
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.parts import Grid
 from groundstation.chapters.wording import sentence
 from groundstation.cli.lines import shortened
-from groundstation.pipeline.one_flight.line import verdict_first
+from groundstation.pipeline.one_flight.line import line_of_results, verdict_first
 from groundstation.plots.marks import Curve, Dots
 from groundstation.plots.plot import Panel
 from groundstation.reports.drawing import Drawing, drawn_by
@@ -19,6 +20,7 @@ from groundstation.results.answer import by_analysis
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.gates import GateState
 from groundstation.simulation.approach import load_approach, simulate_approach
+from groundstation.systems import systems
 from groundstation.systems.landing.analysis import LANDING
 from groundstation.systems.landing.answer import GatePlace, LandingResult, StabilisedAt, StabilityLost
 from groundstation.systems.landing.chapter import landing
@@ -125,6 +127,11 @@ def test_terminal_findings_page_and_table_say_one_thing_with_its_side(above_path
     assert sides == {side} == {at.lost.side for at in one.stabilised if at.lost is not None}
 
 
+STEP = StepEntry(
+    kind="backward", mistake="", record_index=24, records_before=18, set_s=-4.0, shift_of_earlier_s=-4.0, size_s=-3.0
+)
+
+
 def test_a_line_of_the_terminal_has_room_for_counts_and_further_approaches(with_site: FlightResults) -> None:
     answer = with_site.answer(LandingResult)
     assert answer is not None
@@ -143,11 +150,21 @@ def test_a_line_of_the_terminal_has_room_for_counts_and_further_approaches(with_
     last = verdict_first("Not stabilised", line)
     held = f"{len(gates) - 1} held; go-around {name} stabilised; 2 touch-and-goes {name} not stabilised"
     failed = "1 failed (from 84 m: glide path up to 1.4 dots high)"
-    assert last == f"not stabilised: landing {name}: {failed}, {held}"
+    assert landed.touchdown is not None and landed.touchdown.time_utc is not None
+    down = f"touchdown {landed.touchdown.time_utc[11:19]}Z"
+    assert last == f"not stabilised: landing {name}: {failed}, {held}; {down}"
     narrow = shortened(last, len(last) - 10)
     assert narrow == last.replace(" (from 84 m: glide path up to 1.4 dots high)", "")
     told = LANDING.sentence(by_analysis(replace(answer, approaches=(replace(landed, stabilised=good),))))
-    assert told.startswith(f"landing {name} stabilised from 305 m (1000 ft): ")
+    assert told.startswith(f"landing {name} stabilised from 305 m (1000 ft): ") and told.endswith(f"; {down}")
+    without_utc = replace(landed, stabilised=good, touchdown=replace(landed.touchdown, time_utc=None, time_s=2674.4))
+    told = LANDING.sentence(by_analysis(replace(answer, approaches=(without_utc,))))
+    assert told.endswith("; touchdown 44:34")
+    only = by_analysis(replace(answer, approaches=(without_utc,)))
+    stepped = replace(with_site, answers=only, clock=Clock(steps=(STEP,)))
+    assert line_of_results(stepped, systems()).startswith(f"{verdict_first('Stabilised', told)}; clock step -3 s")
+    section = landing(stepped)
+    assert section is not None and section.headline.endswith(": stabilised, touchdown 44:34")
 
 
 def test_limits_on_the_page_are_those_of_the_settings(with_site: FlightResults) -> None:
