@@ -33,7 +33,7 @@ OPENS = {
     "ulog/pyulog_sample.ulg": ("bad", "Bad", "“no barometer found", "the recorder paused"),
     "ulog/px4_rs_6ba1abc7.ulg": ("bad", "Bad", "Magnetic field wrong throughout", "26 s of GNSS"),
     "dataflash/TestLog2_REENCODED_plane.BIN": ("warn", "Warnings", "Setpoints followed poorly", "nothing lost"),
-    "tlog/uavlogviewer_vtol.tlog": ("warn", "Warnings", "Sensor or estimator switched at 0:30", "RTK fixed"),
+    "tlog/uavlogviewer_vtol.tlog": ("warn", "Warnings", "Gyro unhealthy throughout", "RTK fixed"),
     "gnss/walk_0827_gnss_1730.ubx": ("warn", "Warnings", "RTK fixed 65 %", "2:14 min of GNSS"),
     "gnss/rtklib_demo1_out.pos": (
         "warn",

@@ -3,6 +3,7 @@
 Shares of time in the air, worst span, and the threshold behind it.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -36,6 +37,7 @@ CHECKS: Mapping[str, str] = {  # in the order they are told
 ORDER: tuple[Verdict, ...] = ("not_logged", "pass", "warn", "fail")
 HOLD_STEPS, SHORTEST_HOLD_S, LONGEST_HOLD_S = 3.0, 2.0, 10.0  # how long a sample speaks
 EVENTS_TOLD = 3
+TOLD_AS_INFORMATION = ("switches",)  # what a check that passes tells of its messages
 LEAST_PAUSE_S = 2.0  # of the log: without a sample of anything judged
 ONLY_FLOWN = ("tracking", "saturation")  # on the ground nothing follows its setpoints
 
@@ -376,7 +378,8 @@ def _check(
     told = [(graded[one.grade], one) for one, in_air in zip(events, flown, strict=True) if in_air]
     verdict = worst_of([*(one.verdict for one in measures), *(grade for grade, _ in told)])
     decisive = next((one for one in measures if one.verdict == verdict), None) if verdict != "not_logged" else None
-    texts = [one.text for grade, one in told if grade == verdict and verdict != "pass"]
+    is_told = verdict != "pass" or key in TOLD_AS_INFORMATION
+    texts = [one.text for grade, one in told if grade == verdict and is_told]
     return Check(
         key=key,
         title=title,
@@ -397,6 +400,8 @@ def _reason(verdict: Verdict, decisive: Measure | None, texts: Sequence[str], me
             return "not judged: no limit in the log"
         return "logged, but not in the air" if measures else ""
     if texts:
-        more = f" and {len(texts) - EVENTS_TOLD} more" if len(texts) > EVENTS_TOLD else ""
-        return "; ".join(dict.fromkeys(texts[:EVENTS_TOLD])) + more
+        counts = Counter(texts)
+        told = [text if count == 1 else f"{text} ({count} times)" for text, count in counts.items()]
+        more = f" and {len(told) - EVENTS_TOLD} more" if len(told) > EVENTS_TOLD else ""
+        return "; ".join(told[:EVENTS_TOLD]) + more
     return "" if decisive is None or verdict == "pass" else decisive.told

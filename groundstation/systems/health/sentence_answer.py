@@ -11,10 +11,11 @@ from groundstation.systems.health.answer import FIRST, IN_TENTHS_S, LOST, Attitu
 
 MOST_BAD = 4
 BEGINS = "first: "
-MORE = re.compile(r" and \d+ more$")
+MORE = re.compile(r"(?: \(\d+ times\))?(?: and \d+ more)?$")  # behind the first text of a reason
 APART_S = 0.05  # failures that begin nearer have no order
 THROUGHOUT, OF_THE_TIME = " throughout", " % of the time"
 MOSTLY = 0.8  # of the time: a longer span needs no times
+CAUTION = "caution"
 WHOLE = 0.995  # of the time: "throughout", which a share told as 99 % is not
 QUOTED = ("faults", "battery", "gnss", "link")  # checks of which what was said is quoted
 LONGEST = 50  # characters of a message that the sentence quotes
@@ -165,6 +166,8 @@ def _special(check: Check) -> str:
     measure = check.decisive
     if measure is not None and measure.quantity in OF_QUANTITY:
         return OF_QUANTITY[measure.quantity]
+    if measure is not None and measure.quantity == CAUTION:
+        return measure.sensor  # "gyro unhealthy"
     if measure is not None and measure.quantity.endswith("_unused"):
         beside = {"innovations": "doubts its sensors", "resets": "went its own way"}.get(check.key, "is in doubt")
         return f"a filter not in use {beside}"
