@@ -5,13 +5,13 @@ Shares of time in the air, worst span, and the threshold behind it.
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from groundstation.base.records import Int64Array
 from groundstation.base.units import NS_PER_S
-from groundstation.systems.health.answer import FIRST, Check, Measure, Verdict
+from groundstation.systems.health.answer import FIRST, LOGGED_BLANK, Check, Measure, Verdict
 from groundstation.systems.health.evidence import Event, Evidence, FloatArray, Spans
 from groundstation.systems.health.limits import Threshold
 from groundstation.tables.table import Flight
@@ -87,8 +87,12 @@ def judge(
     end_ns = flight.start_ns + round(flight.duration_s * NS_PER_S)
     clocks: dict[int, _Clock] = {}  # several quantities share the rows of a topic
     judged = []
+    blanks: dict[str, list[str]] = {}
     for each in evidence:
         if each.check in ONLY_FLOWN and not air.is_flown:
+            continue
+        if each.blank:
+            blanks.setdefault(each.check, []).append(each.blank)
             continue
         if id(each.time_ns) not in clocks:
             clocks[id(each.time_ns)] = _clock(each.time_ns, air, end_ns)
@@ -99,7 +103,8 @@ def judge(
     checks = []
     for key, title in CHECKS.items():
         measures = tuple(one.measure for one in judged if one.measure.check == key)
-        checks.append(_check(flight, key, title, measures, [one for one in events if one.check == key], air))
+        mine = [one for one in events if one.check == key]
+        checks.append(_with_blanks(_check(flight, key, title, measures, mine, air), blanks.get(key, ())))
     return tuple(checks), tuple(judged)
 
 
@@ -392,6 +397,14 @@ def _check(
             None,
         ),
     )
+
+
+def _with_blanks(check: Check, blanks: Sequence[str]) -> Check:
+    """Return a check with what is logged of it without a value in its reason."""
+    told = "; ".join(blanks)
+    if check.verdict == "not_logged" and not check.measures and told:
+        return replace(check, reason=f"{LOGGED_BLANK}{told}")
+    return replace(check, reason="; ".join(filter(None, (check.reason, told))))
 
 
 def _reason(verdict: Verdict, decisive: Measure | None, texts: Sequence[str], measures: Sequence[Measure]) -> str:

@@ -192,7 +192,8 @@ def findings(flight: Flight) -> tuple[Finding, ...]:
 
     It has how often and when first. A finding that fails would say that the log could not be processed: it warns.
 
-    Texts that differ in measured values alone are one kind; another unit (IMU 0, IMU 1) is another. Beyond ``MOST_TOLD`` kinds the rest is counted.
+    Texts that differ in measured values alone are one kind; another unit (IMU 0, IMU 1) is another. Beyond
+    ``MOST_TOLD`` kinds the rest is counted.
     """
     groups: dict[tuple[str, str], list[Event]] = {}
     for event in sorted(events(flight), key=lambda one: one.time_ns):

@@ -183,3 +183,25 @@ def test_a_recorded_log_of_a_simulator_without_its_filter() -> None:
     told = {one.key: one.verdict for one in answer(made).checks}
     assert told["gnss"] == "pass" and told["vibration"] == "pass"
     assert told["innovations"] == "not_logged"  # every ratio is zero and no flag is set
+    why = {one.key: one.reason for one in answer(made).checks}
+    assert why["innovations"] == "logged, but EKF_STATUS_REPORT is zero throughout"
+    assert why["battery"].startswith("battery 1 not measured (SYS_STATUS.voltage_battery: no voltage); supply")
+    assert "filter logged without values" in answer(made).sentence
+
+
+def test_messages_of_zeros_are_logged_without_values(tmp_path: Path) -> None:
+    def write(log: Telemetry, time_us: int) -> None:
+        log.add("ekf_status_report", 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, time_us=time_us)
+        log.add("vibration", 0, 0.0, 0.0, 0.0, 67, 0, 0, time_us=time_us + 1)
+        log.add("sys_status", 1, 1, 1, 300, 0, -1, -1, 0, 0, 0, 0, 0, 0, time_us=time_us + 2)
+        log.add("power_status", 5_000, 0, 0, time_us=time_us + 3)
+
+    found_in = answer(flight(tmp_path, write))
+    told = {one.key: (one.verdict, one.reason) for one in found_in.checks}
+    assert told["innovations"] == ("not_logged", "logged, but EKF_STATUS_REPORT is zero throughout")
+    assert told["vibration"] == ("not_logged", "logged, but VIBRATION is zero throughout")
+    unmeasured = "battery 1 not measured (SYS_STATUS.voltage_battery: no voltage)"
+    assert told["battery"] == ("pass", f"{unmeasured}; supply of the board up to 5 V")
+    clipping = found_in.check("clipping")
+    assert clipping.measures[0].told == "accelerometer clipped (IMU 1): none, its counter stood at 67 throughout"
+    assert clipping.measures[1].told == "accelerometer clipped (IMU 2): none"
