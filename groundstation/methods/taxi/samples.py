@@ -215,8 +215,9 @@ def pair_samples(
         raise NotAssessableError(f"heading, {gnss_topic}", "no GNSS velocity in the log")
     part, is_after = _ground_part(gnss, np.asarray(ground.mask), bool(method), settings, with_later_runs)
     if not part.size:
-        reason = f"{NO_CONTACT} before lift-off" if method else _no_ground_reason(settings)
-        raise NotAssessableError(f"heading, {gnss_topic}", reason)
+        if method:
+            raise NotAssessableError("heading", f"{NO_CONTACT} before lift-off")
+        raise NotAssessableError(f"heading, {gnss_topic}", _no_ground_reason(settings))
     gnss, mask = gnss.take(part), np.asarray(ground.mask)[part]
     time_s = flight.seconds(gnss.time_ns)
     ins_time, ins_heading = _ins_heading(flight, ins_topic, given.values_deg, time_s)

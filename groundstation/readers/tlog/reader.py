@@ -21,6 +21,7 @@ from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Source
 from groundstation.readers.tlog.canonical import ARMED, INSTANCES, ROLES
 from groundstation.readers.tlog.clock import ClockSurvey, TlogClocks
+from groundstation.readers.tlog.clock_remarks import clock_remarks
 from groundstation.readers.tlog.dialect import DialectMessage, crc_extras, messages
 from groundstation.readers.tlog.frames import FrameBlock
 from groundstation.readers.tlog.timer import Timer
@@ -134,7 +135,8 @@ def items(source: Source, reader_name: str) -> Iterator[Item]:
         for topic, parts in sorted(canonical.items()):
             batch = merged(topic, parts)
             yield from bounded(one_row_each(batch) if len(parts) > 1 else batch)
-    yield from _remarks(served, filled, clocks.texts(vehicle, timer.most_late_ns))
+    yield from _remarks(served, filled)
+    yield from clock_remarks(clocks, vehicle, timer)
     for topic, count in sorted(nowhere.items()):
         if count:
             yield Remark("no_position", f"{topic}: {count} {NO_POSITION}", topic, ("latitude_deg", "longitude_deg"))
@@ -259,10 +261,8 @@ class _Arming:
             canonical.setdefault("event", []).append(event)
 
 
-def _remarks(
-    served: Mapping[str, Sequence[Assignment]], filled: Collection[str], clock_texts: Iterable[str]
-) -> Iterator[Remark]:
-    """Yield remarks on what serves each topic, and by which clock."""
+def _remarks(served: Mapping[str, Sequence[Assignment]], filled: Collection[str]) -> Iterator[Remark]:
+    """Yield remarks on what serves each topic."""
     sources: dict[str, list[str]] = {}
     for name, several in served.items():
         for one in several:
@@ -270,5 +270,3 @@ def _remarks(
             if one.topic in filled:
                 yield from one.rule.told(one.topic)
     yield from mapped(sources, filled)
-    for text in clock_texts:
-        yield Remark("clock_used", text)
