@@ -22,7 +22,7 @@ _LIGHT = re.compile(
     r"\berr(?:or)?s?\b|fail|\bbad\b|unhealthy|not healthy|glitch|variance|lane switch|stopped aiding|time-?out|"
     r"\blow\b.*\b(?:battery|voltage)|battery\b.*\b(?:low|critical)|denied|reject|refus|invalid|inconsistent|warning|"
     r"\bneeds? (?:accel|compass|rc|3d)|not (?:available|ready|found|calibrated|responding)|"
-    r"switch(?:ed|ing) to (?:compass|lane|imu|gps|primary)|"
+    r"switch(?:ed|ing) to (?:lane|imu|gps|primary)|"
     r"\bno (?:gps|rc|ekf|sd|compass|ahrs|gyro|accel)\b|disconnect|yaw re-?(?:set|align)|exceed|dangerous",
     re.I,
 )

@@ -8,7 +8,7 @@ import numpy as np
 from groundstation.base.clock import Clock, RelationEntry
 from groundstation.base.ledger import DamageEntry, Ledger
 from groundstation.base.signals import RAW_PREFIX
-from groundstation.base.words import counted
+from groundstation.base.words import capitalised, counted
 from groundstation.chapters.parts import Facts, Figure, Grid, Head, Note, Section, kept
 from groundstation.chapters.provenance import source_pairs
 from groundstation.chapters.wording import (
@@ -19,6 +19,7 @@ from groundstation.chapters.wording import (
     number_with_unit,
     significant,
     typeset,
+    with_full_stop,
     words,
 )
 from groundstation.chapters.wording import clock as clock_of_flight
@@ -26,6 +27,8 @@ from groundstation.results.arrays.flight import LedgerRows
 from groundstation.results.flight import FlightResults
 
 LEAD = ""
+CLOCK_REMARKS = ("clock_used", "link_delay")
+MOST_CLOCK_NOTES = 4
 MOST_TOPICS = 60
 MOST_ENTRIES = 20
 MOST_DAMAGES = 60
@@ -50,11 +53,17 @@ def quality(results: FlightResults) -> Section:
     """Return the chapter; every flight has a ledger."""
     parts = (
         *(_damages(results.ledger), _topics(results), _pauses(results.ledger), Figure("quality.gaps")),
-        *(_clock_steps(results.clock), _other_clocks(results.clock)),
+        *(_clock_steps(results.clock), _other_clocks(results.clock), *_clock_notes(results.ledger)),
     )
     workings = (_nested(results.clock, "Clock model"), _nested(results.ledger, "Ledger of the log"))
     headline, above = f"{results.flight_id}: {results.status}", (Facts("", source_pairs(results.source)),)
     return Section("quality", "Data quality", LEAD, kept(parts), headline, above, appendix=kept(workings))
+
+
+def _clock_notes(ledger: Ledger) -> tuple[Note, ...]:
+    """Return by which clock times are, and how late a link was."""
+    told = [one.text for one in ledger.remarks if one.code in CLOCK_REMARKS]
+    return tuple(Note(with_full_stop(capitalised(typeset(text)))) for text in told[:MOST_CLOCK_NOTES])
 
 
 def _topics(results: FlightResults) -> Grid | None:

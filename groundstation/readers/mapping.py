@@ -3,7 +3,7 @@
 All readers whose logs name their messages share it: a reader states its roles and what its log offers.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Protocol, TypeAlias
@@ -110,12 +110,24 @@ def assigned(roles: Iterable[Role], offers: Sequence[OfferedMessages]) -> Iterat
                 break
 
 
-def mapped(sources: Mapping[str, Sequence[str]]) -> Iterator[Remark]:
-    """Yield one remark that lists, by canonical topic, the names in the log that serve it."""
-    if sources:
-        yield Remark(
-            "mapped", "; ".join(f"{topic} from {', '.join(names)}" for topic, names in sorted(sources.items()))
-        )
+def mapped(sources: Mapping[str, Sequence[str]], filled: Collection[str] | None = None) -> Iterator[Remark]:
+    """Yield one remark that lists, by canonical topic, the names in the log that serve it.
+
+    ``filled`` are the topics that have rows: of another one its sources hold no value. None: all have.
+
+    Examples
+    --------
+    >>> [one.text for one in mapped({"air": ["WIND"], "electric": ["SYS_STATUS"]}, {"air"})]
+    ['air from WIND; no electric: SYS_STATUS has no value of it']
+    """
+    told = [
+        f"{topic} from {', '.join(names)}"
+        if filled is None or topic in filled
+        else f"no {topic}: {', '.join(names)} {'has' if len(names) == 1 else 'have'} no value of it"
+        for topic, names in sorted(sources.items())
+    ]
+    if told:
+        yield Remark("mapped", "; ".join(told))
 
 
 def scaled(fields: Mapping[str, tuple[str, float]]) -> Callable[[NumericColumns], Columns]:

@@ -27,13 +27,13 @@ def simulated_by(flight: Flight) -> str:
 
 
 def _found(flight: Flight) -> str:
+    for name in HARDWARE:
+        if "SITL" in flight.metadata.get(name, "").upper():
+            return f"{name} {flight.metadata[name]}"
     for name in TOPICS:
         topic = f"raw.{name}"
         if any(one == topic or one.startswith(f"{topic}.") for one in flight.topics() if len(flight[one])):
             return name
-    for name in HARDWARE:
-        if "SITL" in flight.metadata.get(name, "").upper():
-            return f"{name} {flight.metadata[name]}"
     if np.any(_numbers(flight, "raw.HEARTBEAT", "base_mode").astype(np.int64) & HIL_ENABLED):
         return "HEARTBEAT: hardware in the loop"
     if np.any(_numbers(flight, "raw.vehicle_status", "hil_state") > 0.0):

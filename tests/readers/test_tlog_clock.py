@@ -11,6 +11,7 @@ from pymavlink.dialects.v10 import ardupilotmega as v1
 from pymavlink.dialects.v20 import ardupilotmega as v2
 
 from groundstation.base.records import RecordBatch, Remark
+from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
 from groundstation.pipeline.one_flight.flight import read_flight
 from groundstation.pipeline.one_flight.log import open_log
@@ -127,8 +128,10 @@ def test_bursts_are_no_gaps_and_no_speeds(tmp_path: Path) -> None:
     assert len(flight["ins"]) == len(flight["gnss"]) == ROWS, "attitude and position of one instant are one row"
     north_m = np.diff(flight["gnss"].values("latitude_deg")) * 111_000
     assert (north_m / np.diff(flight["gnss"].time_ns) * 1e9).max() < 2 * 5.6
-    texts = [one["text"] for one in found.info.remarks if one["code"] == "clock_used"]
-    assert any("up to 4.80 s" in text for text in texts)
+    (told,) = [one["text"] for one in found.info.remarks if one["code"] == "link_delay"]
+    of_first = "the first 4.800 s after the earliest value is valid (with +0.020 s of the clock its reading is +4.820 s"
+    assert told.startswith(f"frames arrived up to 4.80 s late, {of_first} from that value); values are valid by")
+    assert found.info.clock.first_device_time == utc_ns_to_iso(flight.start_ns + 4_820 * MILLISECOND_NS)
 
 
 def test_times_of_receipt_are_kept(tmp_path: Path) -> None:

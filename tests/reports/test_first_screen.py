@@ -4,9 +4,11 @@ import pytest
 
 import groundstation
 from groundstation.chapters.front import front
+from groundstation.cli.lines import LONGEST, shortened
 from groundstation.pipeline.one_flight.flight import sentence
 from groundstation.results.recorded import simulated
 from groundstation.systems import systems
+from groundstation.tables.simulated import simulated_by
 from tests.real_logs import real_log
 
 # Log: colour, word, part of the headline, part of the line on the recording.
@@ -31,7 +33,7 @@ OPENS = {
     "ulog/pyulog_sample.ulg": ("bad", "Bad", "“no barometer found", "the recorder paused"),
     "ulog/px4_rs_6ba1abc7.ulg": ("bad", "Bad", "Magnetic field wrong throughout", "26 s of GNSS"),
     "dataflash/TestLog2_REENCODED_plane.BIN": ("warn", "Warnings", "Setpoints followed poorly", "nothing lost"),
-    "tlog/uavlogviewer_vtol.tlog": ("warn", "Warnings", "Sensor or estimator switched at 0:30", "RTK fixed"),
+    "tlog/uavlogviewer_vtol.tlog": ("warn", "Warnings", "Gyro unhealthy throughout", "RTK fixed"),
     "gnss/walk_0827_gnss_1730.ubx": ("warn", "Warnings", "RTK fixed 65 %", "2:14 min of GNSS"),
     "gnss/rtklib_demo1_out.pos": (
         "warn",
@@ -55,6 +57,13 @@ OPENS = {
 }
 
 
+# Logs of simulators by what they say themselves: ver_hw PX4_SITL or SITL, SIMSTATE; all others are of hardware.
+SIMULATED = {
+    "ulog/sample_px4_events.ulg": "ver_hw PX4_SITL",
+    "ulog/px4_rs_6ba1abc7.ulg": "ver_hw SITL",
+    "tlog/uavlogviewer_vtol.tlog": "SIMSTATE",
+}
+
 # Their trajectories take seconds.
 LONG = {"dataflash/TestLog2_REENCODED_plane.BIN", "foreign/robot_localization_husky_test1.bag"}
 
@@ -68,5 +77,20 @@ def test_a_recorded_log_opens_on_what_its_owner_asks(name: str) -> None:
     assert top.verdict is not None and (top.verdict.tone, top.verdict.text) == (tone, word)
     assert headline.lower() in top.headline.lower() and line in top.recorded
     assert "No answer" not in top.line
-    told = sentence(results).lower().removeprefix(f"{simulated(results).lower()}; ")
-    assert word == "Recorded" or told.startswith(f"{word.lower()}: "), sentence(results)
+    told = simulated(results)
+    assert told == (f"simulated vehicle ({SIMULATED[name]})" if name in SIMULATED else "")
+    line = sentence(results)
+    answer = line.removeprefix(f"{told}; ").lower()
+    assert word == "Recorded" or answer.startswith(f"{word.lower()}: "), line
+    short = shortened(line, LONGEST)
+    assert not told or (short.startswith("simulated vehicle") and f"; {answer[:40]}" in short.lower()), short
+
+
+@pytest.mark.real_log
+@pytest.mark.parametrize("folder", ["ulog", "dataflash", "tlog"])
+def test_only_logs_of_simulators_are_called_simulated(folder: str) -> None:
+    logs = sorted(one for one in real_log(folder).iterdir() if one.is_file())
+    found = {f"{folder}/{one.name}": simulated_by(groundstation.open(one).flight) for one in logs}
+    assert {name: told for name, told in found.items() if told} == {
+        name: told for name, told in SIMULATED.items() if name.startswith(f"{folder}/")
+    }

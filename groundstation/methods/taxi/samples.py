@@ -202,8 +202,9 @@ def pair_samples(
     ``with_later_runs`` adds the epochs after lift-off at which ground contact is proven: landing roll and taxi in.
 
     The heading is interpolated along the shorter arc between INS samples no farther apart than
-    ``heading_gap_max_s``; elsewhere it is NaN. The part before lift-off ends where ground contact, once proven, is
-    lost for more than 5 s at speed; where nothing is proven, at ``lift_off_speed_mps``.
+    ``heading_gap_max_s``; elsewhere it is NaN. The part before lift-off is from the first proven ground contact to
+    where none is proven for more than 5 s at speed; where nothing is proven, to ``lift_off_speed_mps``. Ground that is
+    proven after such a time alone is that of the landing.
     """
     gnss = distinct_epochs(flight[gnss_topic])
     gnss = replace(gnss, time_ns=gnss.time_ns - round(gnss_latency_s * NS_PER_S))
@@ -214,6 +215,8 @@ def pair_samples(
         raise NotAssessableError(f"heading, {gnss_topic}", "no GNSS velocity in the log")
     part, is_after = _ground_part(gnss, np.asarray(ground.mask), bool(method), settings, with_later_runs)
     if not part.size:
+        if method:
+            raise NotAssessableError("heading", f"{NO_CONTACT} before lift-off")
         raise NotAssessableError(f"heading, {gnss_topic}", _no_ground_reason(settings))
     gnss, mask = gnss.take(part), np.asarray(ground.mask)[part]
     time_s = flight.seconds(gnss.time_ns)
@@ -276,15 +279,15 @@ def _before_lift_off(gnss: Table, on_ground: BoolArray, is_proven: bool, setting
     if not is_proven:
         return slice(0, int(fast[0]) if len(fast) else len(gnss))
     contact = np.flatnonzero(on_ground)
-    if not len(contact):
+    if not contact.size:
         raise NotAssessableError("heading", NO_CONTACT)
     time_s = (gnss.time_ns - gnss.time_ns[0]) / NS_PER_S
-    off = (~on_ground) & (np.arange(len(gnss)) > contact[0]) & (speed > MOVING_MPS)
+    off = (~on_ground) & (speed > MOVING_MPS)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], off, [False]]).astype(np.int8)))
     for start, end in zip(edges[::2], edges[1::2], strict=True):
         is_fast = float(speed[start:end].max()) > settings.taxi_speed_max_mps
         if is_fast and time_s[min(end, len(gnss) - 1)] - time_s[start] > 5.0:
-            return slice(int(contact[0]), int(start))
+            return slice(min(int(contact[0]), int(start)), int(start))
     return slice(int(contact[0]), len(gnss))
 
 

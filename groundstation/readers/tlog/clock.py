@@ -6,7 +6,7 @@ the clock on the time of receipt. SYSTEM_TIME states UTC. A message without a ti
 sent before and behind it.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import NamedTuple, TypeAlias
@@ -222,29 +222,6 @@ class TlogClocks:
     senders: Mapping[int, SenderClock]
     offsets: Offsets
     ground_ns: int
-
-    def texts(self, vehicle: int, most_late_ns: int) -> Iterator[str]:
-        """Yield texts on the clocks for the user.
-
-        ``most_late_ns`` is how late a frame arrived at most.
-        """
-        for record, size_ns in self.offsets.steps():
-            yield f"the ground station's clock was set by {size_ns / NS_PER_S:+.3f} s before frame {record}"
-        if self.ground_ns:
-            off_s = -self.ground_ns / NS_PER_S
-            yield f"UTC is that of the vehicle's messages: the ground station's clock is {off_s:+.3f} s off"
-        clock = self.senders.get(vehicle)
-        if clock is None:
-            yield "times are those of receipt on the ground, by the ground station's clock; the link's delay is in them"
-            return
-        name, late_s = messages()[clock.reference].name, most_late_ns / NS_PER_S
-        yield (
-            f"device times are those of receipt on the ground; values are valid by the vehicle's clock ({name}), set "
-            f"by the frames that arrived soonest: others arrived up to {late_s:.2f} s later"
-        )
-        if len(clock.epochs) > 1:
-            starts = ", ".join(str(epoch.first) for epoch in clock.epochs[1:])
-            yield f"the vehicle's clock started again: before frame {starts}"
 
 
 class ClockSurvey:

@@ -4,7 +4,7 @@ Each message comes raw, and canonical where a rule serves it.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,6 +21,7 @@ from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Source
 from groundstation.readers.tlog.canonical import ARMED, INSTANCES, ROLES
 from groundstation.readers.tlog.clock import ClockSurvey, TlogClocks
+from groundstation.readers.tlog.clock_remarks import clock_remarks
 from groundstation.readers.tlog.dialect import DialectMessage, crc_extras, messages
 from groundstation.readers.tlog.frames import FrameBlock
 from groundstation.readers.tlog.timer import Timer
@@ -118,6 +119,7 @@ def items(source: Source, reader_name: str) -> Iterator[Item]:
     served = _served(met)
     armed, timer = _Arming(), Timer(clocks)
     nowhere: Counter[str] = Counter()
+    filled: set[str] = set()
     for block, following in _with_next(frames):
         canonical: dict[str, list[TopicPart]] = {}
         validity_ns = timer.validity_ns(block, following)
@@ -129,10 +131,12 @@ def items(source: Source, reader_name: str) -> Iterator[Item]:
             if system == vehicle:
                 _take(canonical, part, served.get(message.name, ()), nowhere)
                 armed.take(canonical, part, message.name)
+        filled |= canonical.keys()
         for topic, parts in sorted(canonical.items()):
             batch = merged(topic, parts)
             yield from bounded(one_row_each(batch) if len(parts) > 1 else batch)
-    yield from _remarks(served, clocks.texts(vehicle, timer.most_late_ns))
+    yield from _remarks(served, filled)
+    yield from clock_remarks(clocks, vehicle, timer)
     for topic, count in sorted(nowhere.items()):
         if count:
             yield Remark("no_position", f"{topic}: {count} {NO_POSITION}", topic, ("latitude_deg", "longitude_deg"))
@@ -257,13 +261,12 @@ class _Arming:
             canonical.setdefault("event", []).append(event)
 
 
-def _remarks(served: Mapping[str, Sequence[Assignment]], clock_texts: Iterable[str]) -> Iterator[Remark]:
-    """Yield remarks on what serves each topic, and by which clock."""
+def _remarks(served: Mapping[str, Sequence[Assignment]], filled: Collection[str]) -> Iterator[Remark]:
+    """Yield remarks on what serves each topic."""
     sources: dict[str, list[str]] = {}
     for name, several in served.items():
         for one in several:
             sources.setdefault(one.topic, []).append(name)
-            yield from one.rule.told(one.topic)
-    yield from mapped(sources)
-    for text in clock_texts:
-        yield Remark("clock_used", text)
+            if one.topic in filled:
+                yield from one.rule.told(one.topic)
+    yield from mapped(sources, filled)

@@ -24,10 +24,14 @@ class Timer:
     ----------
     most_late_ns : int
         How late a frame arrived at most, so far.
+    first_received_ns, earliest_ns : int, optional
+        When the first frame was received, and the earliest time of validity: both in UTC.
     """
 
     def __init__(self, clocks: TlogClocks) -> None:
         self.most_late_ns = 0
+        self.first_received_ns: int | None = None
+        self.earliest_ns: int | None = None
         self._clocks = clocks
         self._readers: dict[tuple[int, int], TimeReader] = {}
         self._before: dict[int, NDArray[np.int64]] = {}  # the last reference of each sender: record, receipt, its clock
@@ -68,6 +72,12 @@ class Timer:
         self._remember(rows_of, own, known, is_known)
         late_ns = (received_ns - utc_ns)[is_known]
         self.most_late_ns = max(self.most_late_ns, int(late_ns.max(initial=0)))
+        if self.first_received_ns is None and len(block):
+            self.first_received_ns = int(received_ns[0])
+        placed_ns = utc_ns[has_own | is_known]
+        if len(placed_ns):
+            earliest_ns = int(placed_ns.min())
+            self.earliest_ns = earliest_ns if self.earliest_ns is None else min(self.earliest_ns, earliest_ns)
         validity_ns, device_ns = utc_ns - self._clocks.offsets.at(index), block.received.values
         # Frames received at one time may get others; a time of validity that is the device's would go with it.
         validity_ns += (validity_ns == device_ns) & self._is_repeated(device_ns, following)

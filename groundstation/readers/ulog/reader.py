@@ -176,6 +176,7 @@ class _CanonicalTopics:
         self._armed: bool | None = None
         self._flight_mode: float | None = None
         self._mode = "gnss_aided" if found.fixed else "attitude"
+        self._filled: set[str] = set()
 
     def take(self, topic: Topic, index: Int64Array, time: Column, rows: NDArray[Any]) -> None:
         """Convert the data that a block has of a PX4 topic."""
@@ -237,6 +238,7 @@ class _CanonicalTopics:
     def batches(self) -> Iterator[RecordBatch]:
         """Yield batches of what was taken since the last call."""
         parts, self._parts = self._parts, {}
+        self._filled |= parts.keys()
         for topic, several in parts.items():
             batch = merged(topic, several)
             yield from bounded(_one_row_each(batch) if topic == "event" else batch)
@@ -249,7 +251,7 @@ class _CanonicalTopics:
                 name = f"{source}.{instance}" if instance else source
                 if name not in sources.setdefault(assignment.topic, []):
                     sources[assignment.topic].append(name)
-        yield from mapped(sources)
+        yield from mapped(sources, self._filled)
         if any(a.topic == "ins" for several in self._found.assignments.values() for a in several):
             text = "ins.mode: the autopilot's own filter; gnss_aided when the log has a satellite fix, else attitude"
             yield Remark("derived", text, "ins", ("mode",))

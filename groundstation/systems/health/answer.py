@@ -75,7 +75,7 @@ class Measure:
     verdict: Verdict
     rule: Literal["share", "median", "mean", "rise"]
     figure: float | None
-    worst: float  #: Worst value in the air.
+    worst: float  #: Worst value in the air; of a counter its highest reading, which may be from before.
     worst_at_s: float  #: Flight second of the worst.
     median: float | None
     mean: float | None
@@ -120,7 +120,8 @@ class Measure:
         if self.figure is None:
             return self.name
         if self.rule == "rise" and self.figure == 0.0:
-            return f"{self.name}: none"
+            stood = f", its counter stood at {self.worst:g} throughout" if self.worst > 0.0 else ""
+            return f"{self.name}: none{stood}"
         if self.rule != "share":
             how = {"median": "median", "mean": "mean", "rise": "rose by"}[self.rule]
             return f"{self.name} {how} {self.figure:.3g}{unit}"
@@ -132,6 +133,9 @@ class Measure:
             else ""
         )
         return f"{self.name} {'down to' if self.is_below else 'up to'} {self.figure:.3g}{unit}{over}"
+
+
+LOGGED_BLANK = "logged, but "  # begins the reason of a check whose quantities have no value
 
 
 @dataclass(frozen=True)

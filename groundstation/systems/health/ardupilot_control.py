@@ -13,7 +13,7 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.health.ardupilot_sensors import supply
-from groundstation.systems.health.evidence import Evidence
+from groundstation.systems.health.evidence import Evidence, blank
 from groundstation.systems.health.lean import between, down_of
 from groundstation.systems.health.logged import (
     FloatArray,
@@ -71,13 +71,17 @@ def battery(flight: Flight) -> Iterator[Evidence]:
 def used(quantity: str, source: str, time_ns: Int64Array, value: FloatArray, instance: int) -> Iterator[Evidence]:
     """Yield voltage or current of a battery as it is.
 
-    A battery of a few volts, or without current, is none.
+    A battery of a few volts is none, and one without any voltage not measured; one without current tells none.
     """
-    is_volt = quantity == "battery_v"
+    is_volt, name = quantity == "battery_v", f"battery {instance + 1}"
+    known = value[np.isfinite(value)]
+    if is_volt and len(time_ns) and not np.any(known > LEAST_VOLT):
+        most = known.max(initial=0.0)
+        told = "no voltage" if not most > 0.0 else f"at most {most:.1f} V"
+        yield blank("battery", source, time_ns, f"{name} not measured ({source.removeprefix('raw.')}: {told})")
     value = np.where(value > (LEAST_VOLT if is_volt else -1.0), value, np.nan)
     if np.any(value > 0.0):
-        unit = "V" if is_volt else "A"
-        yield Evidence("battery", quantity, f"battery {instance + 1}", source, unit, time_ns, value, instance)
+        yield Evidence("battery", quantity, name, source, "V" if is_volt else "A", time_ns, value, instance)
 
 
 def _prefix(instance: int) -> str:

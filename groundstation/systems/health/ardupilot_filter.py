@@ -17,7 +17,7 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.geodesy import continuous_longitude_deg, has_position
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
-from groundstation.systems.health.evidence import Event, Evidence
+from groundstation.systems.health.evidence import ZERO, Event, Evidence, blank
 from groundstation.systems.health.logged import (
     FloatArray,
     Logged,
@@ -78,8 +78,12 @@ def evidence(flight: Flight) -> Iterator[Evidence]:
             continue
         is_used = used is None or used.flew(name)
         suffix, words = ("", "") if is_used else (UNUSED, f" ({name}, not in use)")
-        for quantity, sensor, series, source in _ratios(lanes, used, name):
+        ratios = list(_ratios(lanes, used, name))
+        for quantity, sensor, series, source in ratios:
             yield Evidence("innovations", quantity + suffix, sensor + words, source, "", series.time_ns, series.value)
+        if is_used and not ratios:
+            table = lanes[0].table
+            yield blank("innovations", table.topic, table.time_ns, f"{table.topic.removeprefix('raw.')} is {ZERO}")
         for sensor, series, source in _states(lanes, used, name):
             is_fault = source.endswith(".FS")
             check, grade = (

@@ -5,7 +5,7 @@ The flight in a sentence, a table of checks, lanes, panels, what was logged.
 
 from collections.abc import Mapping, Sequence
 
-from groundstation.base.words import tenths_text
+from groundstation.base.words import capitalised, tenths_text
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Cell, Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, Tone
 from groundstation.chapters.wording import (
@@ -23,6 +23,7 @@ from groundstation.results.flight import FlightResults
 from groundstation.systems.health.answer import (
     FIRST,
     HEADLINES,
+    LOGGED_BLANK,
     AutopilotHealth,
     Check,
     Happening,
@@ -49,10 +50,12 @@ def health(results: FlightResults) -> Section | None:
     if answer is None:
         return without_answer(results, "health", TITLE, LEAD)
     told = [one for one in answer.checks if one.is_told]
-    missing = [one.title for one in answer.checks if not one.is_told]
+    blank = [one for one in answer.checks if not one.is_told and one.reason.startswith(LOGGED_BLANK)]
+    missing = [one.title for one in answer.checks if not one.is_told and one not in blank]
     shown = [one.key for one in told if one.is_bad or one.key in FIRST]
     parts: list[Part] = [
         _checks(told),
+        *(Note(f"{capitalised(one.title)}: {one.reason}.", "unknown") for one in blank),
         *([Note(f"Not logged: {', '.join(missing)}.", "unknown")] if missing else []),
         *([Figure("health.motors")] if answer.loss is not None and answer.loss.motors else []),
         Figure("health.lanes"),
@@ -207,7 +210,7 @@ def _measures(answer: AutopilotHealth) -> Grid:
         (
             one.name,
             Mark(TONES[one.verdict], "no limit" if one.is_unjudged else WORDS[one.verdict]),
-            f"{significant(one.worst)} {sign_of(one.unit)}".strip(),
+            _worst(one),
             tenths_text(one.worst_at_s),
             significant(one.median),
             f"{percent(one.amber_share, 1)} / {percent(one.amber_share_log, 1)}",
@@ -218,6 +221,13 @@ def _measures(answer: AutopilotHealth) -> Grid:
         for one in answer.measures
     ]
     return Grid("Every quantity", heads, rows, "Logged: share of the time in the air.")
+
+
+def _worst(measure: Measure) -> str:
+    """Return the worst value, of a counter how far it rose."""
+    if measure.rule == "rise":
+        return f"rose by {significant(measure.figure)}" if measure.figure is not None else ABSENT
+    return f"{significant(measure.worst)} {sign_of(measure.unit)}".strip()
 
 
 def _estimator(answer: AutopilotHealth) -> list[tuple[str, str, str]]:

@@ -3,14 +3,15 @@
 Shares of time in the air, worst span, and the threshold behind it.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from groundstation.base.records import Int64Array
 from groundstation.base.units import NS_PER_S
-from groundstation.systems.health.answer import FIRST, Check, Measure, Verdict
+from groundstation.systems.health.answer import FIRST, LOGGED_BLANK, Check, Measure, Verdict
 from groundstation.systems.health.evidence import Event, Evidence, FloatArray, Spans
 from groundstation.systems.health.limits import Threshold
 from groundstation.tables.table import Flight
@@ -36,6 +37,7 @@ CHECKS: Mapping[str, str] = {  # in the order they are told
 ORDER: tuple[Verdict, ...] = ("not_logged", "pass", "warn", "fail")
 HOLD_STEPS, SHORTEST_HOLD_S, LONGEST_HOLD_S = 3.0, 2.0, 10.0  # how long a sample speaks
 EVENTS_TOLD = 3
+TOLD_AS_INFORMATION = ("switches",)  # what a check that passes tells of its messages
 LEAST_PAUSE_S = 2.0  # of the log: without a sample of anything judged
 ONLY_FLOWN = ("tracking", "saturation")  # on the ground nothing follows its setpoints
 
@@ -85,8 +87,12 @@ def judge(
     end_ns = flight.start_ns + round(flight.duration_s * NS_PER_S)
     clocks: dict[int, _Clock] = {}  # several quantities share the rows of a topic
     judged = []
+    blanks: dict[str, list[str]] = {}
     for each in evidence:
         if each.check in ONLY_FLOWN and not air.is_flown:
+            continue
+        if each.blank:
+            blanks.setdefault(each.check, []).append(each.blank)
             continue
         if id(each.time_ns) not in clocks:
             clocks[id(each.time_ns)] = _clock(each.time_ns, air, end_ns)
@@ -97,7 +103,8 @@ def judge(
     checks = []
     for key, title in CHECKS.items():
         measures = tuple(one.measure for one in judged if one.measure.check == key)
-        checks.append(_check(flight, key, title, measures, [one for one in events if one.check == key], air))
+        mine = [one for one in events if one.check == key]
+        checks.append(_with_blanks(_check(flight, key, title, measures, mine, air), blanks.get(key, ())))
     return tuple(checks), tuple(judged)
 
 
@@ -376,7 +383,8 @@ def _check(
     told = [(graded[one.grade], one) for one, in_air in zip(events, flown, strict=True) if in_air]
     verdict = worst_of([*(one.verdict for one in measures), *(grade for grade, _ in told)])
     decisive = next((one for one in measures if one.verdict == verdict), None) if verdict != "not_logged" else None
-    texts = [one.text for grade, one in told if grade == verdict and verdict != "pass"]
+    is_told = verdict != "pass" or key in TOLD_AS_INFORMATION
+    texts = [one.text for grade, one in told if grade == verdict and is_told]
     return Check(
         key=key,
         title=title,
@@ -391,12 +399,22 @@ def _check(
     )
 
 
+def _with_blanks(check: Check, blanks: Sequence[str]) -> Check:
+    """Return a check with what is logged of it without a value in its reason."""
+    told = "; ".join(blanks)
+    if check.verdict == "not_logged" and not check.measures and told:
+        return replace(check, reason=f"{LOGGED_BLANK}{told}")
+    return replace(check, reason="; ".join(filter(None, (check.reason, told))))
+
+
 def _reason(verdict: Verdict, decisive: Measure | None, texts: Sequence[str], measures: Sequence[Measure]) -> str:
     if verdict == "not_logged":
         if any(one.is_unjudged for one in measures):
             return "not judged: no limit in the log"
         return "logged, but not in the air" if measures else ""
     if texts:
-        more = f" and {len(texts) - EVENTS_TOLD} more" if len(texts) > EVENTS_TOLD else ""
-        return "; ".join(dict.fromkeys(texts[:EVENTS_TOLD])) + more
+        counts = Counter(texts)
+        told = [text if count == 1 else f"{text} ({count} times)" for text, count in counts.items()]
+        more = f" and {len(told) - EVENTS_TOLD} more" if len(told) > EVENTS_TOLD else ""
+        return "; ".join(told[:EVENTS_TOLD]) + more
     return "" if decisive is None or verdict == "pass" else decisive.told

@@ -19,6 +19,7 @@ FloatArray = NDArray[np.float64]
 Grade = Literal["info", "warn", "fail"]
 SHORTEST_FLIGHT_S = 2.0  # a shorter span off the ground is a flag that bounces
 NS = int(NS_PER_S)
+ZERO = "zero throughout"
 ARMED_BIT = 128  # of MAVLink's base mode
 
 
@@ -42,6 +43,8 @@ class Evidence:
     value : ndarray, shape (n,)
         NaN where absent.
     instance : int, optional
+    blank : str
+        Why it is logged without a value; empty where it has values.
     """
 
     check: str
@@ -52,10 +55,16 @@ class Evidence:
     time_ns: Int64Array
     value: FloatArray
     instance: int | None = None
+    blank: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "time_ns", frozen(np.asarray(self.time_ns, dtype=np.int64)))
         object.__setattr__(self, "value", frozen(np.asarray(self.value, dtype=np.float64)))
+
+
+def blank(check: str, source: str, time_ns: Int64Array, why: str) -> Evidence:
+    """Return evidence that a check's quantity is logged without a value, and why: ``VIBRATION is zero throughout``."""
+    return Evidence(check, "", "", source, "", time_ns, np.full(len(time_ns), np.nan), blank=why)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from groundstation.base.ardupilot_codes import MODES
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.health import ardupilot_sensors
 from groundstation.systems.health.ardupilot_control import STEPS_PER_DB, used, voltage
-from groundstation.systems.health.evidence import Event, Evidence
+from groundstation.systems.health.evidence import ZERO, Event, Evidence, blank
 from groundstation.systems.health.logged import Series, bit, changes, is_number
 from groundstation.systems.health.messages import texts
 from groundstation.tables.parameters import parameters_of
@@ -108,7 +108,7 @@ def _is_px4(flight: Flight) -> bool:
 def _filter(flight: Flight) -> Iterator[Evidence]:
     """Yield innovations of the filter.
 
-    A ratio that is zero throughout is of a sensor that was never fused.
+    A ratio that is zero throughout is of a sensor that was never fused; a message that is, of no filter.
     """
     for name, quantity, fields, flags in (
         ("EKF_STATUS_REPORT", "test_ratio_root", _ROOTS, _EKF_FLAGS),
@@ -117,8 +117,12 @@ def _filter(flight: Flight) -> Iterator[Evidence]:
         table = _table(flight, name)
         if table is None:
             continue
+        known = [field for field, _sensor in fields if is_number(table, field)]
+        told = (*known, *(("flags",) if is_number(table, "flags") else ()))
+        if known and not any(np.any(table.values(field) != 0.0) for field in told):
+            yield blank("innovations", table.topic, table.time_ns, f"{name} is {ZERO}")
         for field, sensor in fields:
-            if is_number(table, field) and np.any(table.values(field) > 0.0):
+            if field in known and np.any(table.values(field) > 0.0):
                 yield _of("innovations", quantity, sensor, table, field)
         if is_number(table, "flags") and np.any(table.values("flags") > 0.0):
             for place, sensor in flags:
@@ -149,10 +153,12 @@ def _vibration(flight: Flight) -> Iterator[Evidence]:
     table = _table(flight, "VIBRATION")
     if table is None:
         return
-    for axis in "xyz" if not _is_px4(flight) else "":
-        field = f"vibration_{axis}"
-        if is_number(table, field) and np.any(table.values(field) != 0.0):
-            yield _of("vibration", "vibration_mps2", f"IMU 1 {axis}", table, field, "m/s2")
+    fields = [field for axis in "xyz" if is_number(table, field := f"vibration_{axis}") and not _is_px4(flight)]
+    if fields and not any(np.any(table.values(field) != 0.0) for field in fields):
+        yield blank("vibration", table.topic, table.time_ns, f"VIBRATION is {ZERO}")
+    for field in fields:
+        if np.any(table.values(field) != 0.0):
+            yield _of("vibration", "vibration_mps2", f"IMU 1 {field[-1]}", table, field, "m/s2")
     for number in range(3):
         field = f"clipping_{number}"
         if is_number(table, field):
@@ -204,7 +210,7 @@ def _battery(flight: Flight) -> Iterator[Evidence]:
         yield from voltage(f"{table.topic}.voltage_battery", table.time_ns, volt, 0, parameters_of(flight))
         yield from used("battery_v", f"{table.topic}.voltage_battery", table.time_ns, volt, 0)
     if table is not None and is_number(table, "current_battery"):
-        ampere = 0.01 * table.values("current_battery")
+        ampere = np.where(table.values("current_battery") >= 0.0, 0.01 * table.values("current_battery"), np.nan)
         yield from used("battery_a", f"{table.topic}.current_battery", table.time_ns, ampere, 0)
     if table is not None and is_number(table, "battery_remaining"):
         left = table.values("battery_remaining")

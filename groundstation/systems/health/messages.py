@@ -30,7 +30,8 @@ from groundstation.tables.table import Flight, Table
 
 ULOG_TEXT, DATAFLASH_TEXT, MAVLINK_TEXT = "raw.ulog.text", "raw.MSG", "raw.STATUSTEXT"
 _COLOURS, _MODULE = re.compile("\x1b\\[[0-9;]*m"), re.compile(r"^\[\w+\]\s+(?=\S)")
-_NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
+# A measured number: with a fraction, of three digits and more, or with its unit; a smaller one counts units of a kind.
+_VALUE = re.compile(r"(?<![\w.])[-+]?(?:\d+\.\d+|\d{3,}|\d+(?= ?(?:[VAsm%°]|m[As]h?|km|deg|hz)\b))", re.I)
 _ESTIMATOR_EVENTS = (60, 62)
 _SWITCH_EVENTS = (67, 90)
 _OF_CHECK = (
@@ -106,13 +107,12 @@ def _events(flight: Flight) -> tuple[Event, ...]:
 def texts(flight: Flight) -> Iterator[Event]:
     """Yield logged text as events of the checks it speaks of.
 
-    A sensor or lane that was switched is worth a warning, whatever its level.
+    A switch keeps its check as information, too: ArduPilot tells the change of a compass at that level.
     """
     for one in messages(flight):
-        is_switch = bool(_OF_CHECK[0][1].search(one.text))
-        grade: Grade = "warn" if is_switch and one.grade == "info" else one.grade
-        check = next((check for check, words in _OF_CHECK if grade != "info" and words.search(one.text)), "faults")
-        yield Event(check, one.time_ns, grade, one.text, one.source)
+        told = (check for check, words in _OF_CHECK if words.search(one.text))
+        check = next((check for check in told if one.grade != "info" or check == "switches"), "faults")
+        yield Event(check, one.time_ns, one.grade, one.text, one.source)
 
 
 def _errors(flight: Flight) -> Iterator[Event]:
@@ -174,17 +174,31 @@ def _mode_names(flight: Flight) -> dict[int, str]:
     return {number: name for number, name in enumerate(known) if name}
 
 
+def kind_of_text(text: str) -> str:
+    """Return a text with ``#`` for what was measured; numbers of units stay.
+
+    Examples
+    --------
+    >>> kind_of_text("EKF2 IMU1 switching to compass 1")
+    'EKF2 IMU1 switching to compass 1'
+    >>> kind_of_text("Battery 1 low 10.2V used 4000 mAh"), kind_of_text("Flow lost for 12 s")
+    ('Battery 1 low #V used # mAh', 'Flow lost for # s')
+    """
+    return _VALUE.sub("#", text)
+
+
 def findings(flight: Flight) -> tuple[Finding, ...]:
     """Return a finding for each kind of warning or failure that was said.
 
     It has how often and when first. A finding that fails would say that the log could not be processed: it warns.
 
-    Texts that differ in numbers alone are one kind. Beyond ``MOST_TOLD`` kinds the rest is counted.
+    Texts that differ in measured values alone are one kind; another unit (IMU 0, IMU 1) is another. Beyond
+    ``MOST_TOLD`` kinds the rest is counted.
     """
     groups: dict[tuple[str, str], list[Event]] = {}
     for event in sorted(events(flight), key=lambda one: one.time_ns):
         if event.grade != "info":
-            groups.setdefault((event.grade, _NUMBER.sub("#", event.text)), []).append(event)
+            groups.setdefault((event.grade, kind_of_text(event.text)), []).append(event)
     ordered = sorted(groups.values(), key=lambda group: (group[0].grade != "fail", group[0].time_ns))
     told = [_finding(flight, group) for group in ordered[:MOST_TOLD]]
     if len(ordered) > MOST_TOLD:
@@ -196,6 +210,7 @@ def findings(flight: Flight) -> tuple[Finding, ...]:
 
 def _finding(flight: Flight, group: list[Event]) -> Finding:
     first = group[0]
-    times = "" if len(group) == 1 else f", {len(group)} times"
+    is_same = all(one.text == first.text for one in group)
+    times = "" if len(group) == 1 else f", {len(group)} times{'' if is_same else ' with other values'}"
     place = f"at {flight.seconds(np.array([first.time_ns]))[0]:.1f} s"
     return Finding("warn", "health.said", f"{first.text}{times}", first.source, place, len(group))

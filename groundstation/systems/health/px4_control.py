@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from groundstation.systems.health.evidence import Evidence, FloatArray
+from groundstation.systems.health.evidence import Evidence, FloatArray, blank
 from groundstation.systems.health.lean import between, down_of
 from groundstation.systems.health.motors import at_limit, motors_of
 from groundstation.systems.health.px4_topics import Topic, evidence_of, newest, topic, topics
@@ -78,6 +78,9 @@ def _battery(flight: Flight) -> Iterator[Evidence]:
             value = np.where(is_there & (one.values(field) > least), one.values(field), np.nan)
             if bool((value > 0.0).any()):
                 yield evidence_of("battery", quantity, name, one, field, value, unit)
+            elif quantity == "battery_v" and one.has(field):
+                why = "no voltage" if is_there.any() else "not connected"
+                yield blank("battery", one.source(field), one.time_ns, f"{name} not measured ({one.name}: {why})")
     power = topic(flight, "system_power")
     if power is None:
         return

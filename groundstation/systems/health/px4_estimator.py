@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from groundstation.systems.health.evidence import Evidence, FloatArray
+from groundstation.systems.health.evidence import ZERO, Evidence, FloatArray, blank
 from groundstation.systems.health.px4_topics import (
     Topic,
     counted,
@@ -138,6 +138,18 @@ def _shown(one: Topic, rows: np.ndarray, value: FloatArray) -> FloatArray:
 
 
 def _ratios(flight: Flight) -> Iterator[Evidence]:
+    ratios = list(_ratios_found(flight))
+    yield from ratios
+    one = next(topics(flight, "estimator_status"), None)
+    if not ratios and one is not None:
+        fields = [
+            field for places in RATIOS.values() for name, fields in places if name == one.name for field in fields
+        ]
+        if any(one.has(field) for field in fields):
+            yield blank("innovations", one.name, one.time_ns, f"the ratios of {one.name} are {ZERO}")
+
+
+def _ratios_found(flight: Flight) -> Iterator[Evidence]:
     for sensor, places in RATIOS.items():
         for name, fields in places:
             found = []

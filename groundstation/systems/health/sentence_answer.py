@@ -7,14 +7,24 @@ import re
 from collections.abc import Mapping, Sequence
 
 from groundstation.base.words import capitalised, clock_text, listed, tenths_text
-from groundstation.systems.health.answer import FIRST, IN_TENTHS_S, LOST, AttitudeLoss, Check, gravity, span_words
+from groundstation.systems.health.answer import (
+    FIRST,
+    IN_TENTHS_S,
+    LOGGED_BLANK,
+    LOST,
+    AttitudeLoss,
+    Check,
+    gravity,
+    span_words,
+)
 
 MOST_BAD = 4
 BEGINS = "first: "
-MORE = re.compile(r" and \d+ more$")
+MORE = re.compile(r"(?: \(\d+ times\))?(?: and \d+ more)?$")  # behind the first text of a reason
 APART_S = 0.05  # failures that begin nearer have no order
 THROUGHOUT, OF_THE_TIME = " throughout", " % of the time"
 MOSTLY = 0.8  # of the time: a longer span needs no times
+CAUTION, BLANK = "caution", "logged without values"
 WHOLE = 0.995  # of the time: "throughout", which a share told as 99 % is not
 QUOTED = ("faults", "battery", "gnss", "link")  # checks of which what was said is quoted
 LONGEST = 50  # characters of a message that the sentence quotes
@@ -115,9 +125,12 @@ def _of_the_first(checks: Sequence[Check]) -> list[str]:
     """Return what is good of GNSS, filter and vibration, and what of them is not logged."""
     known = {one.key: one for one in checks}
     first = [known[key] for key in FIRST if key in known]
-    absent = [NAMES[one.key] for one in first if one.verdict == "not_logged"]
     good = [_part(one) for one in first if one.verdict == "pass"]
-    return [*filter(None, good), *([f"{listed(absent)} not logged"] if absent else [])]
+    unlogged = [one for one in first if one.verdict == "not_logged"]
+    blank = [NAMES[one.key] for one in unlogged if one.reason.startswith(LOGGED_BLANK)]
+    absent = [NAMES[one.key] for one in unlogged if not one.reason.startswith(LOGGED_BLANK)]
+    missing = [f"{listed(names)} {what}" for names, what in ((blank, BLANK), (absent, "not logged")) if names]
+    return [*filter(None, good), *missing]
 
 
 def _by_time(bad: Sequence[Check], loss: AttitudeLoss | None) -> list[str]:
@@ -165,6 +178,8 @@ def _special(check: Check) -> str:
     measure = check.decisive
     if measure is not None and measure.quantity in OF_QUANTITY:
         return OF_QUANTITY[measure.quantity]
+    if measure is not None and measure.quantity == CAUTION:
+        return measure.sensor  # "gyro unhealthy"
     if measure is not None and measure.quantity.endswith("_unused"):
         beside = {"innovations": "doubts its sensors", "resets": "went its own way"}.get(check.key, "is in doubt")
         return f"a filter not in use {beside}"

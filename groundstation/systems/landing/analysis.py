@@ -46,6 +46,7 @@ from groundstation.systems.landing.geometry import (
 )
 from groundstation.systems.landing.height import height_error
 from groundstation.systems.landing.logged import Logged, logged_of
+from groundstation.systems.landing.no_end import why_no_end
 from groundstation.systems.landing.path import FlightPath, path_of, position_topics, step_of
 from groundstation.systems.landing.protection import protection_along
 from groundstation.systems.landing.reference import (
@@ -108,7 +109,7 @@ def _finals(
     path = path_of(flight, settings)
     ends = tuple(with_evidence(flight, path, end) for end in ends_of(path, known.phases, settings)[:MOST_ANALYSED])
     if not ends:
-        raise NotAssessableError("landing", "no landing in the log, and no guided descent followed by a climb")
+        raise NotAssessableError("landing", why_no_end(flight, path, known.phases))
     found = [final_of(path, end, known.site, settings, known.runways) for end in ends]
     left_out = tuple(one for one in found if isinstance(one, LeftOutApproach))
     finals = [one for one in found if isinstance(one, Final)]

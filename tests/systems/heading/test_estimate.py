@@ -502,6 +502,20 @@ def test_what_cannot_be_assessed_says_why(flight: Flight, change: Callable[[Flig
         estimate(change(flight))
 
 
+def test_ground_that_is_proven_after_the_flight_alone_is_not_before_it(flight: Flight) -> None:
+    class Ground:
+        def __init__(self, mask: np.ndarray) -> None:
+            self.mask, self.method = mask, "detector"
+
+    time_s = flight.time_s("gnss")
+    flown = time_s < time_s[0] + 30.0
+    fast = np.where(flown, 40.0, flight["gnss"].values("velocity_north_mps"))
+    made = with_column(flight, "gnss", "velocity_north_mps", fast)
+    ground = lambda time_ns: Ground(flight.seconds(time_ns) >= time_s[0] + 30.0)  # noqa: E731
+    with pytest.raises(NotAssessableError, match="no GNSS epoch with ground contact proven before lift-off"):
+        estimate(made, on_ground=ground)
+
+
 def test_unknown_topic_is_named(flight: Flight) -> None:
     with pytest.raises(NotAssessableError, match=r"no topic ins\.3"):
         estimate(flight, request=HeadingRequest(ins_topic="ins.3"))

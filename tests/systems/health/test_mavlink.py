@@ -11,6 +11,7 @@ from groundstation.systems.health import mavlink
 from groundstation.systems.health.analysis import HEALTH
 from groundstation.systems.health.answer import AutopilotHealth
 from groundstation.systems.health.evidence import Evidence
+from groundstation.systems.health.messages import findings
 from groundstation.systems.health.settings import HealthSettings
 from groundstation.systems.known import Known
 from groundstation.tables.estimator_in_use import estimator_in_use
@@ -129,7 +130,7 @@ def test_what_was_said(tmp_path: Path) -> None:
 
     told = {(one.check, one.grade, one.text) for one in mavlink.events(flight(tmp_path, write))}
     assert {
-        ("switches", "warn", "EKF2 IMU0 switching to compass 1"),
+        ("switches", "info", "EKF2 IMU0 switching to compass 1"),  # the autopilot's own level
         ("battery", "fail", "Battery 1 low 10.2V used 4000 mAh"),
         ("faults", "warn", "Failsafe activated"),
         ("faults", "warn", "PreArm: Need 3D Fix"),
@@ -138,6 +139,31 @@ def test_what_was_said(tmp_path: Path) -> None:
         ("modes", "info", "armed"),
         ("faults", "fail", "state critical"),
     } <= told
+
+
+def test_messages_have_their_own_level_and_only_equal_ones_are_one(tmp_path: Path) -> None:
+    said = {
+        10: (6, b"EKF2 IMU0 switching to compass 1"),
+        12: (6, b"EKF2 IMU1 switching to compass 1"),
+        14: (6, b"EKF2 IMU1 switching to compass 1"),
+        20: (4, b"GPS 1: unhealthy for 10.2 s"),
+        22: (4, b"GPS 2: unhealthy for 10.2 s"),
+        24: (4, b"GPS 2: unhealthy for 11.0 s"),
+    }
+
+    def write(log: Telemetry, time_us: int) -> None:
+        second = (time_us - START_US) // 1_000_000
+        if second in said:
+            log.add("statustext", *said[second], time_us=time_us)
+
+    made = flight(tmp_path, write)
+    switches = next(one for one in answer(made).checks if one.key == "switches")
+    assert switches.verdict == "pass" and switches.events_in_air == 0
+    assert switches.reason == "EKF2 IMU0 switching to compass 1; EKF2 IMU1 switching to compass 1 (2 times)"
+    assert [one.text for one in findings(made)] == [
+        "GPS 1: unhealthy for 10.2 s",
+        "GPS 2: unhealthy for 10.2 s, 2 times with other values",
+    ]
 
 
 def test_px4_modes_and_parameters_that_are_bits(tmp_path: Path) -> None:
@@ -157,3 +183,25 @@ def test_a_recorded_log_of_a_simulator_without_its_filter() -> None:
     told = {one.key: one.verdict for one in answer(made).checks}
     assert told["gnss"] == "pass" and told["vibration"] == "pass"
     assert told["innovations"] == "not_logged"  # every ratio is zero and no flag is set
+    why = {one.key: one.reason for one in answer(made).checks}
+    assert why["innovations"] == "logged, but EKF_STATUS_REPORT is zero throughout"
+    assert why["battery"].startswith("battery 1 not measured (SYS_STATUS.voltage_battery: no voltage); supply")
+    assert "filter logged without values" in answer(made).sentence
+
+
+def test_messages_of_zeros_are_logged_without_values(tmp_path: Path) -> None:
+    def write(log: Telemetry, time_us: int) -> None:
+        log.add("ekf_status_report", 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, time_us=time_us)
+        log.add("vibration", 0, 0.0, 0.0, 0.0, 67, 0, 0, time_us=time_us + 1)
+        log.add("sys_status", 1, 1, 1, 300, 0, -1, -1, 0, 0, 0, 0, 0, 0, time_us=time_us + 2)
+        log.add("power_status", 5_000, 0, 0, time_us=time_us + 3)
+
+    found_in = answer(flight(tmp_path, write))
+    told = {one.key: (one.verdict, one.reason) for one in found_in.checks}
+    assert told["innovations"] == ("not_logged", "logged, but EKF_STATUS_REPORT is zero throughout")
+    assert told["vibration"] == ("not_logged", "logged, but VIBRATION is zero throughout")
+    unmeasured = "battery 1 not measured (SYS_STATUS.voltage_battery: no voltage)"
+    assert told["battery"] == ("pass", f"{unmeasured}; supply of the board up to 5 V")
+    clipping = found_in.check("clipping")
+    assert clipping.measures[0].told == "accelerometer clipped (IMU 1): none, its counter stood at 67 throughout"
+    assert clipping.measures[1].told == "accelerometer clipped (IMU 2): none"
