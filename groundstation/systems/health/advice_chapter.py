@@ -1,10 +1,11 @@
-"""Advice after a lost attitude or a fall: what to inspect before the next flight."""
+"""Advice on what to inspect before the next flight: after a lost attitude or a fall, and by what failed."""
 
 from collections.abc import Iterator
 
 from groundstation.chapters.chapter import Advice
 from groundstation.results.flight import FlightResults
 from groundstation.systems.health.answer import FALL, AttitudeLoss, AutopilotHealth
+from groundstation.systems.health.chapter import with_signs
 
 LOSS, FELL = "lost attitude", "fall"
 SENSORS = {  # checks that, failed before the loss, are inspected too
@@ -31,6 +32,13 @@ def advise(results: FlightResults) -> Iterator[Advice]:
     elif any(one.grade == "fail" and one.text.startswith(FALL) for one in answer.happenings):
         text = "the battery, the power supply, motors and propellers"
         yield Advice("Check", text, FELL, is_pressing=True, is_danger=True)
+    for setting in answer.settings_found:
+        if setting.verdict == "warn":
+            yield Advice("Check", with_signs(setting.told), "", is_pressing=True)
+    if loss is None:
+        failed = [one.key for one in answer.checks if one.verdict == "fail" and one.key in SENSORS]
+        for text in dict.fromkeys(SENSORS[key] for key in failed):
+            yield Advice("Check", text, "", is_pressing=True)
 
 
 def _driving(loss: AttitudeLoss, *, is_rotorcraft: bool) -> str:

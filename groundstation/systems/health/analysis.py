@@ -47,6 +47,7 @@ class _Checked(NamedTuple):
 def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[AutopilotHealth]:
     from groundstation.systems.health import messages
     from groundstation.systems.health.checks import verdict_of
+    from groundstation.systems.health.evidence import not_flown
     from groundstation.systems.health.figures import lanes_figure, motors_figure, series_figure
     from groundstation.systems.health.sentence_answer import told
     from groundstation.tables.estimator_in_use import estimator_in_use
@@ -58,11 +59,12 @@ def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[Auto
     listed = _listed(happenings, settings.most_messages)
     answer = AutopilotHealth(
         verdict=verdict_of(found.checks),
-        sentence=told(found.checks, found.loss),
+        sentence=f"{'Did not fly; ' if not_flown(flight, found.air) else ''}{told(found.checks, found.loss)}",
         autopilot=found.autopilot,
         judged_over=found.air.words,
         judged_by=found.air.method,
         judged_s=found.air.seconds,
+        not_flown=not_flown(flight, found.air),
         checks=found.checks,
         happenings=listed,
         happenings_left_out=len(happenings) - len(listed),
