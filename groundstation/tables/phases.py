@@ -68,6 +68,7 @@ SLOWEST_RUN_MPS = 3.0  # an aircraft that lifts off slower made no run
 LIFTED_M = 1.5  # height at which a lift-off is seen, in smoothed altitudes
 CARRIED_M, CARRIED_S = 5.0, 5.0  # up to that height what is too slow to fly for so long is carried
 SHORTEST_STANDSTILL_S = 3.0
+TURNS_DPS, TURNS_S = 3.0, 2.0  # a vehicle that turns so fast for so long does not stand
 
 
 NO_VEHICLE = Vehicle(None, "nothing says it")
@@ -343,6 +344,7 @@ def _labels(
     """
     label = np.where(ground, rolling, UNKNOWN)
     is_slow = ground & (running_mean(speed, 0.5) <= evidence.settings.standstill_speed_mps)
+    is_slow &= ~_turns(evidence.motion)
     for start, end in runs(is_slow):
         if end - start >= SHORTEST_STANDSTILL_S * RATE_HZ:
             label[start:end] = STANDSTILL
@@ -353,6 +355,17 @@ def _labels(
         if end > start and ground[start:end].any() and rolling != SOMEWHERE_ON_GROUND:
             _mark_runs(label, speed, start, end)
     return label
+
+
+def _turns(motion: Motion) -> BoolArray:
+    """Tell where the attitude turns: what turns does not stand, and a jump of the estimate is no turn."""
+    turns = np.zeros(len(motion), dtype=bool)
+    half = round(0.5 * RATE_HZ)
+    for angle_deg in (motion.heading_deg, motion.roll_deg, motion.pitch_deg):
+        if len(motion) > 2 * half:
+            rate_dps = np.abs(angle_deg[2 * half :] - angle_deg[: -2 * half]) / (2 * half / RATE_HZ)
+            turns[half : len(motion) - half] |= lasting(rate_dps > TURNS_DPS, TURNS_S)
+    return turns
 
 
 def _mark_runs(label: NDArray[np.int64], speed_mps: FloatArray, start: int, end: int) -> None:
