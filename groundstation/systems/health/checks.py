@@ -25,6 +25,7 @@ CHECKS: Mapping[str, str] = {  # in the order they are told
     "clipping": "accelerometer clipping",
     "imu": "IMU bias, IMU against IMU",
     "magnetometer": "magnetometer",
+    "yaw": "yaw against the compass",
     "faults": "faults and failsafes",
     "timing": "timing and log",
     "battery": "battery and supply",
