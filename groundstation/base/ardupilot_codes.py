@@ -9,6 +9,10 @@ from types import MappingProxyType
 
 from groundstation.base.findings import Severity
 
+# Estimators by the number of AHRS_EKF_TYPE and ATT.AEKF (AP_AHRS.h, EKFType); 10 is the truth of the simulator.
+ESTIMATORS: Mapping[int, str] = MappingProxyType(
+    {0: "DCM", 1: "EKF1", 2: "EKF2", 3: "EKF3", 10: "simulator", 11: "external"}
+)
 EVENTS: Mapping[int, str] = MappingProxyType(
     {
         10: "armed",

@@ -1,4 +1,4 @@
-"""Rows with latitude and longitude zero: a receiver without a position writes them."""
+"""Rows that hold zeros in place of values: without a position, and of a filter without states."""
 
 from collections.abc import Mapping
 
@@ -79,3 +79,9 @@ def placed(topic: str, columns: Mapping[str, Column]) -> tuple[dict[str, Column]
 def nowhere(topic: str, count: int, place: str = "the whole log") -> Damage:
     """Return a damage that counts rows without a position; the raw values keep it."""
     return Damage("no_position", place, count, NO_POSITION, topic, loses_data=False)
+
+
+def unready_filter(topic: str, count: int, records: str) -> Damage:
+    """Return a damage that counts rows of a filter that was not initialised; the raw values keep them."""
+    what = f"records of {records} while the filter was not initialised, by its own status: not taken for a solution"
+    return Damage("no_solution", "the whole log", count, what, topic, loses_data=False)

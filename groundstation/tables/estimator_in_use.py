@@ -13,12 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.ardupilot_codes import ESTIMATORS
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.tables.parameters import Parameters, parameters_of
 from groundstation.tables.table import Flight
 
-ARDUPILOT = {0: "DCM", 1: "EKF1", 2: "EKF2", 3: "EKF3", 10: "simulator", 11: "external"}
 DCM, EKF1, PX4_EKF2, PX4_LPE, PX4_Q = "DCM", "EKF1", "PX4 EKF2", "PX4 LPE", "PX4 Q"
+SIMULATOR = "simulator"  # its truth stands in place of an estimate
 _LOGGED = {"EKF1": ("raw.EKF1",), "EKF2": ("raw.NKF1", "raw.NKF1.0"), "EKF3": ("raw.XKF1", "raw.XKF1.0")}
 _EKF_TOPICS = {"EKF": "EKF1", "NKF": "EKF2", "XKF": "EKF3"}
 _PX4_GROUPS = {1: PX4_LPE, 2: PX4_EKF2, 3: PX4_Q}
@@ -136,7 +137,7 @@ def _by_px4(_flight: Flight, parameters: Parameters) -> EstimatorInUse | None:
 
 
 def _ardupilot(kind: int) -> str:
-    return ARDUPILOT.get(kind, f"estimator {kind}")
+    return ESTIMATORS.get(kind, f"estimator {kind}")
 
 
 def _others(flight: Flight, names: tuple[str, ...]) -> tuple[str, ...]:

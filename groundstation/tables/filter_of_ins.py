@@ -4,10 +4,11 @@ import re
 from dataclasses import dataclass
 
 from groundstation.base.signals import topics_of_kind
-from groundstation.tables.estimator_in_use import estimator_in_use
+from groundstation.tables.estimator_in_use import SIMULATOR, estimator_in_use
 from groundstation.tables.table import Flight
 
 _ESTIMATORS = re.compile(r"\b(EKF[123]|DCM)\b")
+TRUTH = "the simulator's truth"
 _NOT_TOLD = "DCM or a filter that is not logged"
 _SECOND = "AHR2, the autopilot's second estimate"
 
@@ -32,6 +33,8 @@ def filter_of_ins(flight: Flight, topic: str) -> FilterOfTopic:
     name = names[-1] if names else "" if in_use is None or in_use.others else in_use.name
     if _SECOND in told and not names:
         return FilterOfTopic("AHR2", False, "AHR2 is the autopilot's second estimate")
+    if TRUTH in told or name == SIMULATOR:  # no filter: nothing estimated it
+        return FilterOfTopic(TRUTH, None, "" if in_use is None else in_use.source)
     if in_use is None or not name:
         return FilterOfTopic(name)
     has_others = len(topics_of_kind("ins", flight.topics())) > 1

@@ -15,7 +15,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.base.units import NS_PER_S
 from groundstation.base.words import counted
-from groundstation.tables.detector import Detection, GroundSettings, detect_ground
+from groundstation.tables.detector import Detection, GroundSettings, detect_ground, lasting
 from groundstation.tables.lift_off import between_lift_off_and_touch_down
 from groundstation.tables.likely import likely_of
 from groundstation.tables.motion import (
@@ -65,6 +65,7 @@ LEAST_COVERAGE = 0.5  # share of the flight for which a flag must speak
 RUN_SHARE = 0.25  # a run begins and a roll ends at this share of the speed at lift-off and touch-down
 SLOWEST_RUN_MPS = 3.0  # an aircraft that lifts off slower made no run
 SHORTEST_STANDSTILL_S = 3.0
+TURNS_DPS, TURNS_S = 3.0, 2.0  # a vehicle that turns so fast for so long does not stand
 
 
 NO_VEHICLE = Vehicle(None, "nothing says it")
@@ -341,6 +342,7 @@ def _labels(
     """
     label = np.where(ground, rolling, UNKNOWN)
     is_slow = ground & (running_mean(speed, 0.5) <= evidence.settings.standstill_speed_mps)
+    is_slow &= ~_turns(evidence.motion)
     for start, end in runs(is_slow):
         if end - start >= SHORTEST_STANDSTILL_S * RATE_HZ:
             label[start:end] = STANDSTILL
@@ -351,6 +353,17 @@ def _labels(
         if end > start and ground[start:end].any() and rolling != SOMEWHERE_ON_GROUND:
             _mark_runs(label, speed, start, end)
     return label
+
+
+def _turns(motion: Motion) -> BoolArray:
+    """Tell where the attitude turns: what turns does not stand, and a jump of the estimate is no turn."""
+    turns = np.zeros(len(motion), dtype=bool)
+    half = round(0.5 * RATE_HZ)
+    for angle_deg in (motion.heading_deg, motion.roll_deg, motion.pitch_deg):
+        if len(motion) > 2 * half:
+            rate_dps = np.abs(angle_deg[2 * half :] - angle_deg[: -2 * half]) / (2 * half / RATE_HZ)
+            turns[half : len(motion) - half] |= lasting(rate_dps > TURNS_DPS, TURNS_S)
+    return turns
 
 
 def _mark_runs(label: NDArray[np.int64], speed_mps: FloatArray, start: int, end: int) -> None:

@@ -604,3 +604,16 @@ def test_a_span_of_many_days_has_no_phases_and_says_so() -> None:
     flight = flight_from_batches([batch], metadata={}, has_utc=False, source_name="days.csv")
     phases = flight_phases(flight)
     assert phases.intervals == () and "a span of many days" in phases.method
+
+
+def test_what_turns_by_hand_does_not_stand() -> None:
+    """A model carried slowly turns by 150 deg in ten seconds; an estimate that jumps is none that turns."""
+    heading = np.concatenate([np.full(3000, 8.0), np.linspace(8.0, 158.0, 1000), np.full(6000, 158.0)])
+    heading[7000:] = 318.0
+    count = len(heading)
+    zero = np.zeros(count)
+    still = Course(zero, zero, zero, zero, heading, np.ones(count, dtype=bool))
+    phases = flight_phases(flight_of(still, weight_on_wheels=np.ones(count, dtype=bool)))
+    standing = [(one.start_s, one.end_s) for one in phases.likely if one.phase == "standstill"]
+    assert standing[0][1] == pytest.approx(3000 * STEP_S, abs=1.0)
+    assert standing[1] == pytest.approx((4000 * STEP_S, (count - 1) * STEP_S), abs=1.0), "the jump is no turn"

@@ -25,7 +25,7 @@ from groundstation.readers.dataflash.values import RecordRows, as_double
 from groundstation.readers.layout import velocity_from_track
 from groundstation.readers.mapping import named
 from groundstation.readers.parts import TopicPart, bounded, merged, occupied, sampled_ns
-from groundstation.readers.places import nowhere
+from groundstation.readers.places import nowhere, unready_filter
 
 RANGE_GOOD, FACING_DOWN = 4, 25
 
@@ -46,6 +46,7 @@ class Mapper:
         self.fields: dict[str, dict[str, None]] = {}  # fields that were yielded, for the remarks
         self._refused: dict[tuple[str, str], int] = {}
         self._nowhere: Counter[str] = Counter()
+        self._unready: Counter[tuple[str, str]] = Counter()
         self._unknown = UnknownUnits()
         self._passed_over: dict[tuple[str, str], tuple[float, str]] = {}
         self._takers = self._all_takers()
@@ -74,6 +75,10 @@ class Mapper:
         for (topic, what), count in self._refused.items():
             yield Damage("unreadable_cells", topic, count, what, topic, loses_data=False)
         yield from (nowhere(topic, count) for topic, count in self._nowhere.items() if count)
+        unready = {key: count for key, count in self._unready.items() if count}
+        if unready:
+            records = " and ".join(dict.fromkeys(name for _topic, name in unready))
+            yield unready_filter(next(iter(unready))[0], sum(unready.values()), records)
         yield from self._unknown.damages()
 
     def remarks(self) -> Iterator[Remark]:
@@ -114,7 +119,9 @@ class Mapper:
         for unit in choices.rates:
             add(unit, "ins", self._plain((*rules.RATES, *rules.ACCELERATIONS)))
         for unit, core in choices.ekf_velocity.items():
-            add(unit, choices.ekf_topic, self._of_core(core, rules.VELOCITY, is_solution=True))
+            for topic, is_used in (("ins", True), ("ins.2", False)):
+                if choices.ekf_flew in (None, is_used):
+                    add(unit, topic, self._of_core(core, rules.VELOCITY, is_solution=True, is_used=is_used))
         for unit, core in choices.ekf_wind.items():
             add(unit, "air", self._of_core(core, rules.WIND, is_solution=False))
         for name in ("EV", "ARM", "MODE", "MSG", "ERR"):
@@ -181,25 +188,38 @@ class Mapper:
         return {**self._attitude(topic, rows), **self._position(topic, rows)}
 
     def _of_core(
-        self, core: int | None, wanted: tuple[FieldRule, ...], is_solution: bool
+        self, core: int | None, wanted: tuple[FieldRule, ...], is_solution: bool, is_used: bool = True
     ) -> Callable[[str, RecordRows], dict[str, Column]]:
-        """Return the function for columns that are present while this filter core is in use.
+        """Return the function for columns that are present while this filter core is in use, and initialised.
 
-        Until the log tells the core in use, it is the first one that it tells.
+        Until the log tells the core in use, it is the first one that it tells. ``is_used`` false: while another
+        estimator gave the attitude.
         """
         primary = self._choices.primary_core
 
         def columns_of(topic: str, rows: RecordRows) -> dict[str, Column]:
             values = self._values(topic, rows, wanted)
-            used = None
+            wrong = self._choices.flies(rows.record_index) != is_used
             if core is not None:
-                used = frozen(primary.at(rows.record_index, before=primary.first) == core)
+                wrong |= primary.at(rows.record_index, before=primary.first) != core
+            unready = self._unready_at(rows) & ~wrong
+            self._unready[topic, rows.definition.name] += int(np.count_nonzero(unready)) if values else 0
+            used = frozen(~(wrong | unready)) if (wrong | unready).any() else None
             columns = {name: Column(column, used) for name, column in values.items()}
             if is_solution and columns:
                 columns["mode"] = self._mode(rows, used)
             return columns
 
         return columns_of
+
+    def _unready_at(self, rows: RecordRows) -> BoolArray:
+        """Tell which records a core of the filter wrote before it had states, shape (n,)."""
+        name, instance = rows.definition.name, rows.instance
+        status = f"{name[:3]}{rules.STATUS_OF[name[3]]}"
+        states = self._found.unready.get((status, instance), self._found.unready.get((status, None)))
+        if states is None:
+            return np.zeros(len(rows), dtype=bool)
+        return np.asarray(states.at(rows.record_index, before=states.first) == 1)
 
     def _gnss(self, topic: str, rows: RecordRows) -> dict[str, Column]:
         position, motion = self._values(topic, rows, rules.POSITION), self._values(topic, rows, rules.GNSS_VELOCITY)

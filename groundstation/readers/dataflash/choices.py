@@ -4,13 +4,19 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from groundstation.base.records import Remark
+import numpy as np
+
+from groundstation.base.ardupilot_codes import ESTIMATORS
+from groundstation.base.records import BoolArray, Int64Array, Remark
 from groundstation.readers import imu
 from groundstation.readers.dataflash import rules
 from groundstation.readers.dataflash.overview import DataflashOverview, States, Unit
 from groundstation.readers.dataflash.rules import FieldRule
 
 _EKF_OF_TYPE = {2.0: "NKF", 3.0: "XKF"}  # parameter AHRS_EKF_TYPE
+_NUMBERS = {"EKF": 1, "NKF": 2, "XKF": 3}  # of ATT.AEKF
+_DCM, _SIMULATOR = 0, 10
+_TITLES = {_SIMULATOR: "the simulator's truth, no estimate", 11: "an external AHRS"}
 _SECOND_CORE = {"1": "6", "2": "7"}  # old firmware logged the second core under these numbers
 
 
@@ -26,12 +32,13 @@ class Choices:
     rates : tuple of sensors
         Whose angular rates and accelerations are those of ``ins``.
     ekf : str
-        ``XKF``, ``NKF``, ``EKF``: the filter in use; empty when none is, or none is logged.
-    ekf_topic : str
-        ``ins``; or ``ins.2`` where the first filter was only the second estimate, as AHR2 is then.
+        ``XKF``, ``NKF``, ``EKF``: the filter whose velocity is taken; empty when none is logged.
+    ekf_flew : bool or None
+        Whether it gave the attitude; None where it did so at times, and ATT.AEKF tells when. While it does not, it is
+        the second estimate, ``ins.2``, as AHR2 is then.
     ekf_velocity, ekf_wind : mapping of sensor to core
         Records of the filter, and the core that wrote them; None where the filter has but one.
-    primary_core : States
+    primary_core, attitude_by : States
     yaw : FieldRule
         What the autopilot's yaw is: true heading, or magnetic where no declination is set.
     yaw_origin : str
@@ -44,10 +51,11 @@ class Choices:
     imu_topics: Mapping[Unit, str]
     rates: tuple[Unit, ...]
     ekf: str
-    ekf_topic: str
+    ekf_flew: bool | None
     ekf_velocity: Mapping[Unit, int | None]
     ekf_wind: Mapping[Unit, int | None]
     primary_core: States
+    attitude_by: States
     yaw: FieldRule
     yaw_origin: str
     mode: str
@@ -81,11 +89,23 @@ class Choices:
         if "discrete" in given:
             text = "state of the land detector (EV land complete, not landed), repeated at each ATT record"
             remarks.append(Remark("derived", text, "discrete", ("weight_on_wheels",)))
-        if "velocity_north_mps" in given.get(self.ekf_topic, ()):
-            fields_of = tuple(f"velocity_{axis}_mps" for axis in ("north", "east", "down"))
-            origin = f"velocity of {self.ekf}1, the core in use" if self.ekf else "velocity of EKF1, not in use"
-            remarks.append(Remark("derived", origin, self.ekf_topic, fields_of))
+        fields_of = tuple(f"velocity_{axis}_mps" for axis in ("north", "east", "down"))
+        for topic, is_used in (("ins", True), ("ins.2", False)):
+            if "velocity_north_mps" in given.get(topic, ()):
+                origin = f"velocity of {self.ekf}1, {self._use(is_used)}"
+                remarks.append(Remark("derived", origin, topic, fields_of))
         return remarks
+
+    def _use(self, is_used: bool) -> str:
+        if self.ekf_flew is None:
+            return f"the core in use, while {'it' if is_used else 'another estimator'} gave the attitude"
+        return "the core in use" if is_used else "not in use"
+
+    def flies(self, record_index: Int64Array) -> BoolArray:
+        """Tell at which records the filter gave the attitude, shape (n,)."""
+        if self.ekf_flew is not None:
+            return np.full(len(record_index), self.ekf_flew)
+        return np.asarray(self.attitude_by.at(record_index, before=self.attitude_by.first) == _NUMBERS[self.ekf])
 
     def _of_imu(self, topic: str, fields: set[str]) -> Remark:
         """Return the remark on the source of a unit."""
@@ -97,19 +117,19 @@ class Choices:
 
 def choose(found: DataflashOverview, vehicle: str) -> Choices:
     """Choose sources by the parameters, and by what has records."""
-    ekf = _filter_in_use(found)
-    is_second = not ekf and found.parameters.get("AHRS_EKF_USE") == 0.0 and "AHRS_EKF_TYPE" not in found.parameters
-    yaw, origin = _yaw(found, ekf)
+    ekf, ekf_flew = _filter(found)
+    yaw, origin = _yaw(found, ekf if ekf_flew else "")
     rates = next((kinds for kinds in (("IMU",), ("GYR", "ACC")) if any(kind in found.types for kind in kinds)), ())
     return Choices(
         sensor_topics=_sensor_topics(found),
         imu_topics=_imu_topics(found),
         rates=tuple(min(units, key=_instance) for name in rates if (units := _units_of(found, name))),
         ekf=ekf,
-        ekf_topic="ins.2" if is_second else "ins",
-        ekf_velocity=_cores(found, "EKF" if is_second else ekf, "1"),
-        ekf_wind=_cores(found, ekf, "2"),
+        ekf_flew=ekf_flew,
+        ekf_velocity=_cores(found, ekf, "1"),
+        ekf_wind={} if ekf_flew is False else _cores(found, ekf, "2"),
         primary_core=found.primary_core.get(f"{ekf}4", States()),
+        attitude_by=found.attitude_by,
         yaw=yaw,
         yaw_origin=origin,
         mode="gnss_aided" if found.has_fix else "attitude",
@@ -158,19 +178,24 @@ def _imu_topics(found: DataflashOverview) -> dict[Unit, str]:
     return topics
 
 
-def _filter_in_use(found: DataflashOverview) -> str:
-    """Return the Kalman filter that the parameters name, if it has records.
+def _filter(found: DataflashOverview) -> tuple[str, bool | None]:
+    """Return the Kalman filter whose velocity is taken, and whether it gave the attitude.
 
-    Without parameters it is the newest filter that has records.
+    ATT.AEKF tells it record by record: a plane flies by DCM until its filter is ready. Else it is the filter that the
+    parameters name, if it has records; without parameters the newest that has. DCM's velocity is not logged: where it
+    flew, that of the filter beside it is taken, as the second estimate.
     """
     kind, used = found.parameters.get("AHRS_EKF_TYPE"), found.parameters.get("AHRS_EKF_USE")
-    if kind is not None:
-        candidates = [_EKF_OF_TYPE[kind]] if kind in _EKF_OF_TYPE else []
-    elif used is not None:
-        candidates = ["EKF"] if used else []
-    else:
-        candidates = ["XKF", "NKF", "EKF"]
-    return next((name for name in candidates if f"{name}1" in found.types), "")
+    told = {_EKF_OF_TYPE.get(kind, "")} if kind is not None else {"EKF"} if used is not None else set(_NUMBERS)
+    numbers = set(found.attitude_by.values.tolist())
+    logged = sorted((name for name in _NUMBERS if f"{name}1" in found.types), key=_NUMBERS.__getitem__, reverse=True)
+    logged.sort(key=lambda name: (_NUMBERS[name] not in numbers, name not in told))
+    if not logged:
+        return "", False
+    if not numbers:
+        return logged[0], logged[0] in told and used != 0.0
+    flew = _NUMBERS[logged[0]] in numbers
+    return logged[0], None if flew and len(numbers) > 1 else flew
 
 
 def _cores(found: DataflashOverview, ekf: str, number: str) -> dict[Unit, int | None]:
@@ -187,10 +212,25 @@ def _cores(found: DataflashOverview, ekf: str, number: str) -> dict[Unit, int | 
     return {**first, **second}
 
 
+def _attitude_numbers(found: DataflashOverview, ekf: str) -> list[int]:
+    """Return the estimators that gave the attitude, the one of the parameters last; none where the log is silent."""
+    kind = found.parameters.get("AHRS_EKF_TYPE")
+    told = _DCM if found.parameters.get("AHRS_EKF_USE") == 0.0 else None if kind is None else int(kind)
+    logged = set(found.attitude_by.values.tolist())
+    if logged:
+        return sorted(logged, key=lambda one: (one == told, one))
+    if ekf:
+        return [_NUMBERS[ekf]]
+    return [told] if told in (_DCM, _SIMULATOR) else []
+
+
 def _yaw(found: DataflashOverview, ekf: str) -> tuple[FieldRule, str]:
     """Return the meaning of the yaw of ATT, by the parameters that set its declination."""
-    names = {"XKF": "EKF3", "NKF": "EKF2", "EKF": "the EKF"}
-    origin = f"yaw of ATT ({names.get(ekf, 'DCM or a filter that is not logged')})"
+    numbers = _attitude_numbers(found, ekf)
+    titles = [_TITLES.get(one, ESTIMATORS.get(one, f"estimator {one}")) for one in numbers]
+    origin = f"yaw of ATT ({' and '.join(titles) or 'DCM or a filter that is not logged'})"
+    if numbers == [_SIMULATOR]:
+        return rules.TRUE_YAW, origin
     automatic, fixed_rad = found.parameters.get("COMPASS_AUTODEC"), found.parameters.get("COMPASS_DEC")
     if (automatic is None and not fixed_rad) or (fixed_rad is None and not automatic):
         return rules.TRUE_YAW, f"{origin}; the log does not tell which declination is in it"

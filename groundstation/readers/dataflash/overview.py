@@ -24,6 +24,8 @@ _GPS_TYPES = ("GPS", "GPS2")
 _ACCURACY_TYPES = {"GPA": "GPS", "GPA2": "GPS2"}
 _ARRIVAL, NS_PER_MS = "SMS", 1e6  # milliseconds since power-up at which the message of a fix was there
 _EKF_STATUS_TYPES = ("EKF4", "NKF4", "XKF4")
+_SECOND_STATUS_TYPES = ("NKF9", "XKF9")  # of the second core, in old firmware
+_NOT_INITIALISED = 7  # bit of FS: the filter has no states yet, and writes zeros (NavEKF3_core::getFilterFaults)
 
 Unit = tuple[str, int | None]  # type and instance: one sensor
 
@@ -85,6 +87,11 @@ class DataflashOverview:
         When the message of a fix came, logged beside its errors.
     primary_core : mapping of EKF status type to States
         Which of the filter's cores was in use.
+    unready : mapping of EKF status sensor to States
+        1 while that core of the filter said that it is not initialised. A status holds for the records before it, back
+        to the status before: a core writes it behind them.
+    attitude_by : States
+        Number of the estimator that gave the attitude (ATT.AEKF).
     landed : States
         1 landed, 0 not, as the land detector's events say.
     damages : tuple of Damage
@@ -103,6 +110,8 @@ class DataflashOverview:
     sigmas: Mapping[Unit, tuple[Int64Array, Mapping[str, FloatArray]]]
     arrivals: Mapping[Unit, tuple[Int64Array, FloatArray]]
     primary_core: Mapping[str, States]
+    unready: Mapping[Unit, States]
+    attitude_by: States
     landed: States
     damages: tuple[Damage, ...]
     counts: Mapping[str, int]
@@ -136,6 +145,9 @@ class _Survey:
         self._arrivals: dict[Unit, list[tuple[Int64Array, FloatArray]]] = {}
         self._unknown = UnknownUnits()
         self._cores: dict[str, list[tuple[Any, Any]]] = {}
+        self._unready: dict[Unit, list[tuple[Any, Any]]] = {}
+        self._last_status: dict[Unit, int] = {}
+        self._attitude_by: list[tuple[Any, Any]] = []
         self._landed: list[tuple[Any, Any]] = []
         self._unread: dict[str, tuple[int, str]] = {}
         self._takers: dict[str, Callable[[RecordRows], None]] = {
@@ -148,7 +160,8 @@ class _Survey:
             "EV": self._event,
             **dict.fromkeys(_GPS_TYPES, self._fixes),
             **dict.fromkeys(_ACCURACY_TYPES, self._accuracy),
-            **dict.fromkeys(_EKF_STATUS_TYPES, self._core),
+            **dict.fromkeys((*_EKF_STATUS_TYPES, *_SECOND_STATUS_TYPES), self._status),
+            "ATT": self._attitude,
         }
 
     def add(self, block: RecordBlock) -> None:
@@ -192,6 +205,8 @@ class _Survey:
             sigmas={unit: _sorted_pairs(parts) for unit, parts in self._sigma.items()},
             arrivals={unit: _sorted(parts) for unit, parts in self._arrivals.items()},
             primary_core={name: _states(parts) for name, parts in self._cores.items()},
+            unready={unit: _states(parts) for unit, parts in self._unready.items()},
+            attitude_by=_states(self._attitude_by),
             landed=_states(self._landed),
             damages=(*scanner.spans.damages(), *self._more_damages(scanner), *self._unknown.damages()),
             counts=self._counts,
@@ -278,11 +293,33 @@ class _Survey:
             sigmas = {rule.field: as_double(part.values(rule.source)) * factor for rule, factor in factors.items()}
             self._sigma.setdefault(receiver, []).append((part.time_ns.values, sigmas))
 
-    def _core(self, rows: RecordRows) -> None:
-        if rows.definition.has_integers("PI"):
-            values = rows.values("PI").astype(np.int64)
-            changed = np.flatnonzero(np.diff(values, prepend=-1))
-            self._cores.setdefault(rows.definition.name, []).append((rows.record_index[changed], values[changed]))
+    def _status(self, rows: RecordRows) -> None:
+        definition = rows.definition
+        if definition.name in _EKF_STATUS_TYPES and definition.has_integers("PI"):
+            self._cores.setdefault(definition.name, []).append(_changes(rows, rows.values("PI")))
+        if definition.has_integers("FS"):
+            instance_field = self._units.instance_field(definition)
+            for part in by_instance(rows, instance_field) if instance_field else (rows,):
+                self._add_unready((definition.name, part.instance), part)
+
+    def _add_unready(self, core: Unit, rows: RecordRows) -> None:
+        """Add from where on a core was initialised, or no more: behind its last status of another state."""
+        state = rows.values("FS").astype(np.int64) >> _NOT_INITIALISED & 1
+        begins = np.concatenate(([self._last_status.get(core, -1)], rows.record_index[:-1])) + 1
+        changed = np.flatnonzero(np.diff(state, prepend=-1))
+        self._unready.setdefault(core, []).append((begins[changed], state[changed]))
+        self._last_status[core] = int(rows.record_index[-1])
+
+    def _attitude(self, rows: RecordRows) -> None:
+        if rows.definition.has_integers("AEKF"):
+            self._attitude_by.append(_changes(rows, rows.values("AEKF")))
+
+
+def _changes(rows: RecordRows, values: Any) -> tuple[Int64Array, Int64Array]:
+    """Return the records at which a state changes, and the state."""
+    numbers = values.astype(np.int64)
+    changed = np.flatnonzero(np.diff(numbers, prepend=-1))
+    return rows.record_index[changed], numbers[changed]
 
 
 def _character(code: int) -> str:

@@ -162,6 +162,7 @@ IMU_TYPES: tuple[tuple[tuple[str, ...], ...], ...] = (
     (("IMU", "IMU2", "IMU3"),),
     (("GYR", "GYR1", "GYR2", "GYR3"), ("ACC", "ACC1", "ACC2", "ACC3")),
 )
+STATUS_OF = {"1": "4", "2": "4", "6": "9", "7": "9"}  # record of a filter's core -> the record of its status
 INCREMENTS = (*(f"DelA{axis}" for axis in "XYZ"), *(f"DelV{axis}" for axis in "XYZ"))
 ANGLE_INTERVAL, VELOCITY_INTERVAL, INTERVAL = "DelaT", "DelvT", "DelT"
 SAMPLED = "SampleUS"  # of GYR and ACC: when the sample was taken

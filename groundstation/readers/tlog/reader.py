@@ -16,7 +16,7 @@ from groundstation.base.records import Column, Damage, Int64Array, Item, LogHead
 from groundstation.base.signals import EVENT_SEPARATOR, RAW_PREFIX
 from groundstation.readers.mapping import Assignment, OfferedMessages, assigned, mapped
 from groundstation.readers.parts import TopicPart, bounded, merged, occupied, one_row_each
-from groundstation.readers.places import placed
+from groundstation.readers.places import placed, unready_filter
 from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Source
 from groundstation.readers.tlog.canonical import ARMED, INSTANCES, ROLES
@@ -24,6 +24,7 @@ from groundstation.readers.tlog.clock import ClockSurvey, TlogClocks
 from groundstation.readers.tlog.clock_remarks import clock_remarks
 from groundstation.readers.tlog.dialect import DialectMessage, crc_extras, messages
 from groundstation.readers.tlog.frames import FrameBlock
+from groundstation.readers.tlog.own_estimate import STATUS, OwnEstimate
 from groundstation.readers.tlog.timer import Timer
 
 BLOCK_BYTES = 4 << 20
@@ -120,26 +121,33 @@ def items(source: Source, reader_name: str) -> Iterator[Item]:
     armed, timer = _Arming(), Timer(clocks)
     nowhere: Counter[str] = Counter()
     filled: set[str] = set()
+    own = OwnEstimate()
     for block, following in _with_next(frames):
         canonical: dict[str, list[TopicPart]] = {}
         validity_ns = timer.validity_ns(block, following)
-        for system, number, which in block.groups:
-            message = known[number]
-            part = _part(block, which, message, validity_ns)
+        own.begin(block.first_index)
+        parts_of = (
+            (system, known[number].name, _part(block, which, known[number], validity_ns))
+            for system, number, which in sorted(block.groups, key=lambda group: known[group[1]].name != STATUS)
+        )
+        for system, name, part in parts_of:
             suffix = "" if system == vehicle else f".{system >> 8}_{system & 255}"
-            yield from bounded(merged(f"{RAW_PREFIX}{message.name}{suffix}", [part]))
+            yield from bounded(merged(f"{RAW_PREFIX}{name}{suffix}", [part]))
             if system == vehicle:
-                _take(canonical, part, served.get(message.name, ()), nowhere)
-                armed.take(canonical, part, message.name)
+                own.see(name, part)
+                _take(canonical, part, served.get(name, ()), nowhere, own)
+                armed.take(canonical, part, name)
         filled |= canonical.keys()
         for topic, parts in sorted(canonical.items()):
             batch = merged(topic, parts)
             yield from bounded(one_row_each(batch) if len(parts) > 1 else batch)
-    yield from _remarks(served, filled)
+    yield from map(own.told, _remarks(served, filled))
     yield from clock_remarks(clocks, vehicle, timer)
     for topic, count in sorted(nowhere.items()):
         if count:
             yield Remark("no_position", f"{topic}: {count} {NO_POSITION}", topic, ("latitude_deg", "longitude_deg"))
+    if own.unready:
+        yield unready_filter("ins", own.unready, "GLOBAL_POSITION_INT")
     yield from frames.damages()
 
 
@@ -204,7 +212,11 @@ def _served(met: Mapping[str, frozenset[str]]) -> dict[str, list[Assignment]]:
 
 
 def _take(
-    canonical: dict[str, list[TopicPart]], part: TopicPart, assignments: Sequence[Assignment], nowhere: Counter[str]
+    canonical: dict[str, list[TopicPart]],
+    part: TopicPart,
+    assignments: Sequence[Assignment],
+    nowhere: Counter[str],
+    own: OwnEstimate,
 ) -> None:
     """Add the values of a message to canonical topics; ``nowhere`` counts missing positions."""
     if not assignments:
@@ -217,6 +229,8 @@ def _take(
         with np.errstate(over="ignore", invalid="ignore"):
             columns, zeros = placed(one.topic, one.rule.columns(numbers))
         nowhere[one.topic] += len(zeros)
+        if one.topic == "ins":
+            columns = own.ready(columns, part.index)
         kept = occupied(TopicPart(part.index, part.time, columns, part.validity_ns))
         if kept is not None:
             canonical.setdefault(one.topic, []).append(kept)

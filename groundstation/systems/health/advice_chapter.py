@@ -1,14 +1,16 @@
-"""Advice after a lost attitude or a fall: what to inspect before the next flight."""
+"""Advice on what to inspect before the next flight: after a lost attitude or a fall, and by what failed."""
 
 from collections.abc import Iterator
 
 from groundstation.chapters.chapter import Advice
 from groundstation.results.flight import FlightResults
-from groundstation.systems.health.answer import FALL, AttitudeLoss, AutopilotHealth
+from groundstation.systems.health.answer import FALL, AttitudeLoss, AutopilotHealth, Check
+from groundstation.systems.health.chapter import with_signs
 
 LOSS, FELL = "lost attitude", "fall"
 SENSORS = {  # checks that, failed before the loss, are inspected too
     "magnetometer": "the compass and its wiring",
+    "yaw": "the calibration of the compass, and what is magnetic near it",
     "imu": "the IMU and its mount",
     "vibration": "what shakes the IMU",
     "clipping": "what shakes the IMU",
@@ -31,6 +33,18 @@ def advise(results: FlightResults) -> Iterator[Advice]:
     elif any(one.grade == "fail" and one.text.startswith(FALL) for one in answer.happenings):
         text = "the battery, the power supply, motors and propellers"
         yield Advice("Check", text, FELL, is_pressing=True, is_danger=True)
+    for setting in answer.settings_found:
+        if setting.verdict == "warn":
+            yield Advice("Check", with_signs(setting.told), "", is_pressing=True)
+    if loss is None:
+        failed = [one.key for one in answer.checks if one.key in SENSORS and _is_inspected(one)]
+        for text in dict.fromkeys(SENSORS[key] for key in failed):
+            yield Advice("Check", text, "", is_pressing=True)
+
+
+def _is_inspected(check: Check) -> bool:
+    """Tell whether a check asks for a look: it failed, or the heading warns, which no pilot sees."""
+    return check.verdict == "fail" or (check.key == "yaw" and check.is_bad)
 
 
 def _driving(loss: AttitudeLoss, *, is_rotorcraft: bool) -> str:

@@ -47,22 +47,24 @@ class _Checked(NamedTuple):
 def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[AutopilotHealth]:
     from groundstation.systems.health import messages
     from groundstation.systems.health.checks import verdict_of
+    from groundstation.systems.health.evidence import not_flown
     from groundstation.systems.health.figures import lanes_figure, motors_figure, series_figure
     from groundstation.systems.health.sentence_answer import told
     from groundstation.tables.estimator_in_use import estimator_in_use
     from groundstation.tables.vehicle import is_rotorcraft
 
     found = _checked(flight, known, settings)
-    used = estimator_in_use(flight)
+    used, grounded = estimator_in_use(flight), not_flown(flight, found.air)
     happenings = _happenings(flight, found.events, found.air)
     listed = _listed(happenings, settings.most_messages)
     answer = AutopilotHealth(
         verdict=verdict_of(found.checks),
-        sentence=told(found.checks, found.loss),
+        sentence=told(found.checks, found.loss, grounded),
         autopilot=found.autopilot,
         judged_over=found.air.words,
         judged_by=found.air.method,
         judged_s=found.air.seconds,
+        not_flown=grounded,
         checks=found.checks,
         happenings=listed,
         happenings_left_out=len(happenings) - len(listed),
@@ -102,6 +104,7 @@ def _read(flight: "Flight", known: Known) -> _Read:
     NotAssessableError
         Where the log holds nothing that a check judges.
     """
+    from groundstation.systems.health import yaw
     from groundstation.systems.health.autopilots import autopilot_of
     from groundstation.systems.health.ending import ends_in_the_air
     from groundstation.systems.health.evidence import in_the_air
@@ -112,7 +115,8 @@ def _read(flight: "Flight", known: Known) -> _Read:
     autopilot = autopilot_of(flight)
     if autopilot is None:
         raise NotAssessableError(CODE, "the log is of no autopilot whose messages are known")
-    evidence, events = against_the_model(flight, autopilot.evidence(flight)), autopilot.events(flight)
+    evidence = (*against_the_model(flight, autopilot.evidence(flight)), *yaw.evidence(flight))
+    events = autopilot.events(flight)
     if not events and not any(bool(np.isfinite(one.value).any()) for one in evidence):
         raise NotAssessableError(CODE, "the log holds no field that a check of the autopilot judges")
     air, stated = in_the_air(flight, known), settings_of(flight, known)

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
+from groundstation.base.angles import wrap_180
 from groundstation.base.words import clock_text, tenths_text
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
@@ -13,6 +14,7 @@ NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not o
 
 Verdict = Literal["pass", "warn", "fail", "not_logged"]
 HEADLINES: Mapping[Verdict, str] = {"pass": "Good", "warn": "Warnings", "fail": "Bad", "not_logged": "Not judged"}
+DECLINATION = "declination"
 FALL = "log ends in the air"  # how the text of a fall begins
 LOST = "attitude_lost_deg"  # quantity of the tracking check
 IN_TENTHS_S = 10.0  # a shorter span is told in tenths of a second
@@ -211,7 +213,16 @@ class SettingFound:
     def told(self) -> str:
         """The two in a line: ``GPS_DELAY_MS: 0.22 s set, 0.12 s found``."""
         found = "not found" if self.found is None else f"{self.found:.3g} {self.unit} found"
-        return f"{self.what} ({self.name}): {self.stated:.3g} {self.unit} set, {found}"
+        after = f": {self.consequence}" if self.consequence else ""
+        return f"{self.what} ({self.name}): {self.stated:.3g} {self.unit} set, {found}{after}"
+
+    @property
+    def consequence(self) -> str:
+        """Effect of a setting that is off; empty where it is not, or where the effect is not known."""
+        if self.what != DECLINATION or self.verdict != "warn" or self.found is None:
+            return ""
+        off_deg = float(wrap_180(self.stated - self.found))
+        return f"true headings {abs(off_deg):.2g} deg too {'large' if off_deg > 0.0 else 'small'}"
 
 
 @dataclass(frozen=True)
@@ -316,6 +327,7 @@ class AutopilotHealth(Answer):
     differing: tuple[ChangedParameter, ...] = ()  #: Parameters off their defaults.
     estimator: str = ""  #: Filter that flew the aircraft; empty where the log does not tell.
     estimator_source: str = ""  #: Parameter or field that tells it.
+    not_flown: str = ""  #: Flag by which it did not fly; empty where it flew, or where no flag says it.
     loss: AttitudeLoss | None = None  #: First loss of control of attitude; null without one.
     cannot_taxi: bool = False  #: The log is of a multirotor or helicopter.
     settings: dict[str, Any] = field(default_factory=dict)

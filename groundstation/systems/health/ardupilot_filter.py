@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.ardupilot_codes import ESTIMATORS
 from groundstation.base.geodesy import continuous_longitude_deg, has_position
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
@@ -33,7 +34,7 @@ from groundstation.systems.health.logged import (
     length,
     named,
 )
-from groundstation.tables.estimator_in_use import ARDUPILOT, EstimatorInUse, estimator_in_use
+from groundstation.tables.estimator_in_use import EstimatorInUse, estimator_in_use
 from groundstation.tables.parameters import parameters_of
 from groundstation.tables.table import Flight, Table
 
@@ -129,7 +130,7 @@ def _not_the_one_set(flight: Flight, used: EstimatorInUse | None) -> Iterator[Ev
 
 def _wanted(flight: Flight) -> str:
     kind = parameters_of(flight).value("AHRS_EKF_TYPE")
-    return ARDUPILOT.get(int(kind), "") if kind is not None else ""
+    return ESTIMATORS.get(int(kind), "") if kind is not None else ""
 
 
 def _ratios(

@@ -54,17 +54,19 @@ def health(results: FlightResults) -> Section | None:
     missing = [one.title for one in answer.checks if not one.is_told and one not in blank]
     shown = [one.key for one in told if one.is_bad or one.key in FIRST]
     parts: list[Part] = [
-        _checks(told),
+        _checks(told, answer.judged_over),
         *(Note(f"{capitalised(one.title)}: {one.reason}.", "unknown") for one in blank),
         *([Note(f"Not logged: {', '.join(missing)}.", "unknown")] if missing else []),
         *([Figure("health.motors")] if answer.loss is not None and answer.loss.motors else []),
         Figure("health.lanes"),
         *(Figure("health.panels", key) for key in shown),
     ]
-    listed = _happenings([one for one in answer.happenings if one.grade != "info"], "Warnings and errors logged")
+    listed = _happenings(
+        [one for one in answer.happenings if one.grade != "info"], "Warnings and errors logged", answer
+    )
     parts += [] if listed is None else [listed]
     others = [Figure("health.panels", one.key) for one in told if one.key not in shown]
-    rest = _happenings([one for one in answer.happenings if one.grade == "info"], "Modes and remarks logged")
+    rest = _happenings([one for one in answer.happenings if one.grade == "info"], "Modes and remarks logged", answer)
     settings = [part for part in (_found(answer), _differing(answer)) if part is not None]
     appendix = (*others, *([] if rest is None else [rest]), _measures(answer), *settings, _basis(answer))
     claim = _claim(answer)
@@ -80,16 +82,18 @@ def _claim(answer: AutopilotHealth) -> Claim:
     first, rest = told_apart(answer.checks, answer.loss)
     sentences = [with_full_stop(typeset(one)) for one in rest]
     sentences.append(f"{number(passed, 0)} of {plural(logged, 'check')} pass {answer.judged_over}.")
+    if answer.not_flown:
+        sentences.append(f"It did not fly ({typeset(answer.not_flown)}).")
     is_danger = answer.verdict == "fail" and answer.is_flown
     return Claim(Rank.HEALTH, mark, typeset(first), "", "", sentences, figures, is_danger=is_danger)
 
 
-def _checks(checks: Sequence[Check]) -> Grid:
+def _checks(checks: Sequence[Check], over: str) -> Grid:
     heads = (
         *(Head("Check"), Head("Verdict"), Head("What decided"), Head("Amber", True), Head("Red", True)),
         *(Head("Longest span, or when"), Head("Limits"), Head("Source of the limits")),
     )
-    caption = "Amber and red: share of the time in the air in which the quantity is logged; amber includes red. "
+    caption = f"Amber and red: share of the time {over} in which the quantity is logged; amber includes red. "
     caption += "The longest span need not hold the worst value: Every quantity has its time."
     return Grid("Checks", heads, [_check(one) for one in checks], caption, ("health_lanes",))
 
@@ -147,7 +151,7 @@ def _limits(measure: Measure) -> str:
     return f"{sign} {' / '.join(levels)} {unit}".strip() if levels else ABSENT
 
 
-def _happenings(happenings: Sequence[Happening], title: str) -> Grid | None:
+def _happenings(happenings: Sequence[Happening], title: str, answer: AutopilotHealth) -> Grid | None:
     if not happenings:
         return None
     rows = [
@@ -155,7 +159,8 @@ def _happenings(happenings: Sequence[Happening], title: str) -> Grid | None:
         for one in happenings[:MOST_LISTED]
     ]
     more = f"The first {MOST_LISTED} of {number(len(happenings), 0)}." if len(happenings) > MOST_LISTED else ""
-    return Grid(title, (Head("Time"), Head("Grade"), Head("What"), Head("In the air")), rows, more)
+    heads = (Head("Time"), Head("Grade"), Head("What"), Head(capitalised(answer.judged_over)))
+    return Grid(title, heads, rows, more)
 
 
 def _found(answer: AutopilotHealth) -> Grid | None:
@@ -204,7 +209,7 @@ def _differing(answer: AutopilotHealth) -> Grid | Note | None:
 def _measures(answer: AutopilotHealth) -> Grid:
     heads = (
         *(Head("Quantity"), Head("Verdict"), Head("Worst", True), Head("At", True), Head("Median", True)),
-        *(Head("Amber, air / log", True), Head("Red, air / log", True), Head("Logged", True), Head("Field")),
+        *(Head("Amber, judged / log", True), Head("Red, judged / log", True), Head("Logged", True), Head("Field")),
     )
     rows = [
         (
@@ -220,7 +225,7 @@ def _measures(answer: AutopilotHealth) -> Grid:
         )
         for one in answer.measures
     ]
-    return Grid("Every quantity", heads, rows, "Logged: share of the time in the air.")
+    return Grid("Every quantity", heads, rows, f"Logged: share of the time {answer.judged_over}.")
 
 
 def _worst(measure: Measure) -> str:

@@ -26,6 +26,7 @@ CHECKS: Mapping[str, str] = {  # in the order they are told
     "clipping": "accelerometer clipping",
     "imu": "IMU bias, IMU against IMU",
     "magnetometer": "magnetometer",
+    "yaw": "yaw against the compass",
     "faults": "faults and failsafes",
     "timing": "timing and log",
     "battery": "battery and supply",
@@ -171,14 +172,17 @@ def _judged(flight: Flight, evidence: Evidence, air: Spans, limit: Threshold, cl
     if limit.hold_s > 0.0:
         grade = _lasting(time_ns, until_ns, grade, round(limit.hold_s * NS_PER_S))
     measure = _measure(flight, evidence, limit, grade, clock, air)
+    if limit.rule == "rise":  # its lane shows when it rose; how long that lasts says nothing
+        grade = np.where(known, _rises(evidence.value, limit), -1)
     return Judged(
         evidence, measure, flight.seconds(time_ns), flight.seconds(until_ns), grade, clock.in_air, limit.is_drawn
     )
 
 
 def _grades(value: FloatArray, limit: Threshold) -> np.ndarray:
+    """Return the grade of each sample; a counter has none of its own."""
     grade = np.zeros(len(value), dtype=np.int8)
-    if limit.rule != "share":
+    if limit.rule == "rise":
         return grade
     with np.errstate(invalid="ignore"):
         for level, above, below in ((1, limit.amber, limit.amber_below), (2, limit.red, limit.red_below)):
@@ -314,6 +318,19 @@ def rise(value: FloatArray, flown: np.ndarray) -> float:
     return float(begun_again[flown[known][1:]].sum())
 
 
+def _rises(value: FloatArray, limit: Threshold) -> np.ndarray:
+    """Return the grade of the samples at which a counter rose, by how far it has risen until then."""
+    grade = np.zeros(len(value), dtype=np.int8)
+    known = np.flatnonzero(np.isfinite(value))
+    steps = np.diff(value[known])
+    steps = np.where(steps < 0.0, value[known][1:], steps)
+    risen = np.cumsum(steps)
+    for level, above in ((1, limit.amber), (2, limit.red)):
+        if above is not None:
+            grade[known[1:][(steps > 0.0) & (risen > above)]] = level
+    return grade
+
+
 def _worst_row(value: FloatArray, among: np.ndarray, limit: Threshold) -> int:
     rows = np.flatnonzero(among & np.isfinite(value))
     is_low = limit.is_below and limit.rule != "rise"
@@ -389,7 +406,7 @@ def _check(
         key=key,
         title=title,
         verdict=verdict,
-        reason=_reason(verdict, decisive, texts, measures),
+        reason=_reason(verdict, decisive, texts, measures, air.words),
         measures=measures,
         events_in_air=sum(grade != "pass" for grade, _ in told),
         first_event_s=next(
@@ -407,11 +424,13 @@ def _with_blanks(check: Check, blanks: Sequence[str]) -> Check:
     return replace(check, reason="; ".join(filter(None, (check.reason, told))))
 
 
-def _reason(verdict: Verdict, decisive: Measure | None, texts: Sequence[str], measures: Sequence[Measure]) -> str:
+def _reason(
+    verdict: Verdict, decisive: Measure | None, texts: Sequence[str], measures: Sequence[Measure], over: str
+) -> str:
     if verdict == "not_logged":
         if any(one.is_unjudged for one in measures):
             return "not judged: no limit in the log"
-        return "logged, but not in the air" if measures else ""
+        return f"logged, but not {over}" if measures else ""
     if texts:
         counts = Counter(texts)
         told = [text if count == 1 else f"{text} ({count} times)" for text, count in counts.items()]

@@ -20,6 +20,7 @@ Grade = Literal["info", "warn", "fail"]
 SHORTEST_FLIGHT_S = 2.0  # a shorter span off the ground is a flag that bounces
 NS = int(NS_PER_S)
 ZERO = "zero throughout"
+FLOWN = "in the air"
 ARMED_BIT = 128  # of MAVLink's base mode
 
 
@@ -88,7 +89,7 @@ class Spans:
     start_ns: Int64Array
     end_ns: Int64Array
     method: str = ""
-    words: str = "in the air"
+    words: str = FLOWN
 
     @property
     def is_flown(self) -> bool:
@@ -128,6 +129,17 @@ def in_the_air(flight: Flight, known: Known) -> Spans:
         if len(spans.start_ns):
             return spans
     return whole_log(flight)
+
+
+def not_flown(flight: Flight, air: Spans) -> str:
+    """Return the flag by which an aircraft did not fly; empty where it flew, or where no flag says it."""
+    if air.words == FLOWN:
+        return ""
+    if "raw.STAT" in flight and is_number(flight["raw.STAT"], "isFlying"):
+        return "" if np.any(flight["raw.STAT"].values("isFlying") == 1.0) else "STAT.isFlying 0"
+    contact = contact_of(flight)
+    is_whole = contact is not None and len(contact.time_ns) > 1 and bool(contact.on_ground.all())
+    return contact.name.partition(" (")[0] if contact is not None and is_whole else ""
 
 
 def whole_log(flight: Flight) -> Spans:
@@ -185,7 +197,7 @@ def _by_armed(flight: Flight) -> Spans:
 
 
 def spans_where(
-    time_ns: Int64Array, is_true: NDArray[np.bool_], hold_ns: int, method: str = "", words: str = "in the air"
+    time_ns: Int64Array, is_true: NDArray[np.bool_], hold_ns: int, method: str = "", words: str = FLOWN
 ) -> Spans:
     """Return the spans in which samples say yes.
 

@@ -13,7 +13,7 @@ from groundstation.base.declination import declination_along
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import topics_of_kind
 from groundstation.results.roles import Delays
-from groundstation.systems.health.answer import ChangedParameter, SettingFound, Verdict
+from groundstation.systems.health.answer import DECLINATION, ChangedParameter, SettingFound, Verdict
 from groundstation.systems.health.evidence import Event, Spans
 from groundstation.systems.health.world_field import first_position
 from groundstation.systems.known import Known
@@ -119,11 +119,12 @@ def _declination(flight: Flight, _known: Known, parameters: Parameters) -> Itera
         else "ATT_MAG_DECL"
     )
     stated = float(np.rad2deg(radians)) if radians is not None else float(degrees or 0.0)
-    what, source = "declination", parameters.source
+    what, source = DECLINATION, parameters.source
     if parameters.value("COMPASS_USE") == 0.0:
         yield SettingFound(name, what, "deg", stated, None, None, "not_logged", "no compass in use", source)
         return
-    is_own = stated == 0.0 and (parameters.value("COMPASS_AUTODEC") == 1.0 or name != "COMPASS_DEC")
+    by_table = parameters.value("COMPASS_AUTODEC") == 1.0  # replaces COMPASS_DEC at the first fix, and logs it nowhere
+    is_own = stated == 0.0 and (by_table or name != "COMPASS_DEC")
     place = first_position(flight)
     reason = "0: by the autopilot's own table" if is_own else _UNTOLD if place is None else ""
     if is_own or place is None or not flight.has_utc:
@@ -138,6 +139,10 @@ def _declination(flight: Flight, _known: Known, parameters: Parameters) -> Itera
     found = float(model.values_deg[0])
     sigma = float(model.sigma_deg[0])
     is_off = abs(float(wrap_180(found - stated))) > max(DECLINATION_WARN_DEG, SIGMAS * sigma)
+    if is_off and by_table:
+        reason = f"COMPASS_AUTODEC 1: the autopilot's own table replaces it at the first fix; {model.model}"
+        yield SettingFound(name, what, "deg", stated, found, sigma, "not_logged", reason, source)
+        return
     yield SettingFound(name, what, "deg", stated, found, sigma, "warn" if is_off else "pass", model.model, source)
 
 

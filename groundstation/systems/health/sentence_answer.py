@@ -40,6 +40,7 @@ WARN: Mapping[str, str] = {
     "clipping": "accelerometer clipped",
     "imu": "IMU doubtful",
     "magnetometer": "magnetic field changes",
+    "yaw": "yaw off the compass",
     "faults": "warnings logged",
     "timing": "timing or log with losses",
     "battery": "battery low",
@@ -87,17 +88,18 @@ FAIL: Mapping[str, str] = {
 }
 
 
-def told(checks: Sequence[Check], loss: AttitudeLoss | None = None) -> str:
+def told(checks: Sequence[Check], loss: AttitudeLoss | None = None, not_flown: str = "") -> str:
     """Return the sentence.
 
-    What fails, in order of time where it has times, what warns, then what of GNSS, filter and vibration is good, then
-    what is not logged.
+    That it did not fly, where a flag says so; what fails, in order of time where it has times; what warns; then what
+    of GNSS, filter and vibration is good, and what is not logged.
     """
     bad = sorted((one for one in checks if one.is_bad), key=gravity)
     parts = _by_time(bad[:MOST_BAD], loss)
     if len(bad) > MOST_BAD:
         parts.append(f"and {len(bad) - MOST_BAD} more")
-    shown = "; ".join(", ".join(filter(None, group)) for group in (parts, _of_the_first(checks)) if any(group))
+    groups = (["did not fly"] if not_flown else [], parts, _of_the_first(checks))
+    shown = "; ".join(", ".join(filter(None, group)) for group in groups if any(group))
     return capitalised(shown)
 
 

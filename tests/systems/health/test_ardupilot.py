@@ -1,6 +1,7 @@
 """Evidence of ArduPilot logs of all eras: what each logs, in which units, and input that is missing or wrong."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,8 +11,9 @@ from groundstation.base.records import Column
 from groundstation.systems.health import ardupilot
 from groundstation.systems.health.analysis import HEALTH
 from groundstation.systems.health.answer import AutopilotHealth
+from groundstation.systems.health.chapter import health
 from groundstation.systems.health.ending import ends_in_the_air
-from groundstation.systems.health.evidence import Event, Evidence, in_the_air
+from groundstation.systems.health.evidence import Event, Evidence, in_the_air, not_flown
 from groundstation.systems.health.logged import low_pass, mean_over
 from groundstation.systems.health.settings import HealthSettings
 from groundstation.systems.known import Known
@@ -19,6 +21,7 @@ from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight, Table
 from tests.readers.dataflash_writer import flight_log
 from tests.real_logs import real_log
+from tests.report_example import example
 from tests.systems.health.made import END_S, KNOWN, NS, seconds, table
 
 TIME = seconds()
@@ -444,7 +447,10 @@ def test_a_healthy_flight_passes_at_any_rate(step_s: float) -> None:
     )
     gnss = table("gnss", seconds(step_s), satellites_used=12.0, hdop=0.8, velocity_sigma_mps=0.3)
     found_out = answer(flight(limits, gnss, *everything(step_s)))
-    assert {one.key: one.verdict for one in found_out.checks if one.verdict != "pass"} == {"settings": "not_logged"}
+    assert {one.key: one.verdict for one in found_out.checks if one.verdict != "pass"} == {
+        "settings": "not_logged",
+        "yaw": "not_logged",
+    }
 
 
 @pytest.mark.parametrize("how", ["nan", "text", "absent", "renamed"])
@@ -471,6 +477,23 @@ def test_when_it_flew() -> None:
     )
     spans = in_the_air(armed, KNOWN)
     assert spans.words == "while armed" and spans.seconds == pytest.approx(55.0 + 30.0)
+    assert not_flown(armed, spans) == "", "no flag says it"
+
+
+def test_a_log_that_says_so_did_not_fly() -> None:
+    time = np.arange(0.0, 100.0)
+    stat = table("raw.STAT", time, isFlying=0.0, Armed=1.0)
+    parameters_set = parameters(COMPASS_OFS_X=1.0)
+    offset = table("raw.MAG", time, MagX=200.0, MagY=0.0, MagZ=400.0, OfsX=700.0, OfsY=0.0, OfsZ=0.0)
+    logged = table("raw.FMT", [0.0], Type=128.0)
+    moved = Flight({one.topic: one for one in (logged, stat, parameters_set, offset)}, {}, 0, False, "made.bin")
+    found = answer(moved)
+    assert (found.judged_over, found.not_flown) == ("while armed", "STAT.isFlying 0")
+    assert found.sentence.startswith("Did not fly; ")
+    told = str(health(replace(example(), answers={"health": found})))
+    assert "It did not fly (STAT.isFlying 0)." in told and "time in the air" not in told
+    flown = answer(flight(parameters_set, offset))
+    assert flown.not_flown == "" and "not fly" not in str(health(replace(example(), answers={"health": flown})))
 
 
 def test_a_log_of_todays_layout(tmp_path: object) -> None:

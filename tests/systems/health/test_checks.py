@@ -46,6 +46,19 @@ def test_shares_are_of_time_and_not_of_samples() -> None:
     assert (found.span_start_s, found.span_end_s) == pytest.approx((50.0, 58.0))
 
 
+def test_lanes_show_what_decided_by_a_median_and_when_a_counter_rose() -> None:
+    """A lane that stays green beside a check that fails hides where it is bad."""
+    time = seconds()
+    offset = evidence("compass_offset", time, np.where(time < 40.0, 200.0, 715.0))
+    dropped = evidence("dropped_records", time, np.where(time < 50.0, 18.0, np.where(time < 60.0, 540.0, 541.0)))
+    checks, judged = judge(flight(), (offset, dropped), (), AIR, thresholds({}))
+    lanes = {one.evidence.quantity: one.grade for one in judged}
+    assert set(lanes["compass_offset"][time < 40.0]) == {0} and set(lanes["compass_offset"][time >= 40.0]) == {2}
+    assert time[lanes["dropped_records"] == 1].tolist() == pytest.approx([50.0, 60.0])
+    verdicts = {one.key: one.verdict for one in checks}
+    assert (verdicts["magnetometer"], verdicts["timing"]) == ("fail", "warn")
+
+
 def test_what_is_on_the_ground_does_not_count() -> None:
     time = seconds()
     found = measure("vibration_mps2", time, np.where(time < 10.0, 90.0, 5.0))

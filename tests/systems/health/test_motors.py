@@ -9,7 +9,7 @@ import pytest
 from groundstation.base.records import Column
 from groundstation.chapters.parts import Facts
 from groundstation.results.flight import FlightResults, NotAssessable
-from groundstation.systems.health.answer import AutopilotHealth
+from groundstation.systems.health.answer import AutopilotHealth, SettingFound
 from groundstation.systems.health.chapter import health
 from groundstation.systems.health.figures import lanes_figure
 from groundstation.systems.health.motors import ardupilot_ends
@@ -157,6 +157,18 @@ def test_what_failed_before_the_loss_is_inspected_too() -> None:
     compass = table("magnetometer", TIME, field_forward_nt=field, field_right_nt=0.0, field_down_nt=0.0)
     told = next_of(answer(made(*flown(2), compass)))
     assert "output 2, the compass and its wiring" in told["Check"]
+
+
+def test_what_failed_is_inspected_though_nothing_was_lost() -> None:
+    """A log with a bad compass and a declination that is off is not answered with "taxi" alone."""
+    offset = table("raw.MAG", TIME, MagX=200.0, MagY=0.0, MagZ=400.0, OfsX=700.0, OfsY=0.0, OfsZ=0.0)
+    found = answer(flight(offset))
+    setting = SettingFound("COMPASS_DEC", "declination", "deg", 11.1, 0.084, 0.4, "warn", "WMM-2025", "raw.PARM")
+    told = next_of(replace(found, settings_found=(setting,)))
+    assert told["Check"] == (
+        "Declination (COMPASS_DEC): 11.1° set, 0.084° found: true headings 11° too large, the compass and its wiring."
+    )
+    assert "Check" not in next_of(answer(flight(table("raw.VIBE.0", TIME, IMU=0.0, VibeX=1.0, VibeY=1.0, VibeZ=1.0))))
 
 
 def test_the_battery_is_told_with_times_though_no_limit_judges_it() -> None:

@@ -120,6 +120,11 @@ def test_the_declination_that_is_set_beside_the_world_model(stated_deg: float, v
     log = flight(dataflash(COMPASS_DEC=np.deg2rad(stated_deg), COMPASS_AUTODEC=0.0), gnss())
     (row,) = settings_of(log, KNOWN).found
     assert row.verdict == verdict and row.found == pytest.approx(3.3, abs=0.5)
+    assert ("true headings 7." in row.told and row.told.endswith("deg too large")) == (verdict == "warn")
+    table = flight(dataflash(COMPASS_DEC=np.deg2rad(stated_deg), COMPASS_AUTODEC=1.0), gnss())
+    (by_table,) = settings_of(table, KNOWN).found
+    assert by_table.verdict == ("pass" if verdict == "pass" else "not_logged"), "replaced at the first fix"
+    assert by_table.found == row.found and not by_table.consequence
     for other in (
         flight(dataflash(COMPASS_DEC=0.2), gnss(), has_utc=False),
         flight(dataflash(COMPASS_DEC=0.2)),
