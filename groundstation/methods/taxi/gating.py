@@ -14,6 +14,7 @@ from groundstation.results.chosen import Interval
 from groundstation.tables.phases import Phases
 
 NOT_TAXI = ("take-off run", "landing roll")  # phases, and reasons: power and wind crab the aircraft
+NOT_PROVEN = "not proven ground"  # reason of an epoch at taxi speed
 CHANGING_MPS2 = 0.5  # a change of speed that is a run's, and not taxi's
 
 
@@ -42,7 +43,7 @@ def gate_samples(
     gate[samples.integrity == 0.0] = "integrity"
     gate[samples.geometry > settings.geometry_max] = "geometry"
     if samples.ground_method:
-        gate[~samples.on_ground] = "not proven ground"
+        gate[~samples.on_ground] = NOT_PROVEN
         gate[~samples.on_ground & (speed > settings.taxi_speed_max_mps)] = "airborne"
     gate[~np.isfinite(samples.heading_deg)] = "no heading"
     for interval in intervals:

@@ -6,10 +6,10 @@ from groundstation.chapters.assessed import reason_of
 from groundstation.chapters.chapter import Advice, Remedies
 from groundstation.chapters.held_signals import is_held
 from groundstation.chapters.wording import number, significant
-from groundstation.results.flight import FlightResults
-from groundstation.results.gates import NO_CONTACT, Gate, in_plain_words
+from groundstation.results.flight import KIND_OF_VEHICLE, WHY_THAT_VEHICLE, FlightResults
+from groundstation.results.gates import NO_CONTACT, NOT_PROVEN, Gate, in_plain_words
 from groundstation.systems.heading.answer import HeadingResult
-from groundstation.systems.heading.gates_answer import GATES
+from groundstation.systems.heading.gates_answer import GATES, STATE_THE_KIND, UNPROVEN
 
 PURPOSE = "heading correction"
 WHEELS = "weight on wheels"
@@ -39,13 +39,29 @@ def advise(results: FlightResults) -> Iterator[Advice]:
     """Yield what helps against each gate that keeps the number from being typed."""
     answer = results.answer(HeadingResult)
     if answer is None:
-        if NO_CONTACT in reason_of(results, HeadingResult.analysis):
-            yield Advice("Record", FROM_THE_STAND if is_held(results, WHEELS) else WHEELS, PURPOSE)
+        reason = reason_of(results, HeadingResult.analysis)
+        if NO_CONTACT in reason or (NOT_PROVEN in reason and _is_found_to_roll(results)):
+            yield _on_proof(results)
         return
     standstill = f"{answer.setting('standstill_max_s', STANDSTILL_S):g} s"
     for gate in answer.gates:
         if gate.state == "failed" or (gate.state == "not_measured" and gate.required):
             yield from _against(gate, standstill)
+    is_told = any(gate.name == UNPROVEN and gate.state == "failed" for gate in answer.gates)
+    if answer.unproven_ground is not None and not is_told:
+        yield _on_proof(results)
+
+
+def _on_proof(results: FlightResults) -> Advice:
+    """Return what proves the ground: the kind of what is found to roll, else a flag."""
+    if _is_found_to_roll(results):
+        return Advice("Check", STATE_THE_KIND, PURPOSE)
+    return Advice("Record", FROM_THE_STAND if is_held(results, WHEELS) else WHEELS, PURPOSE)
+
+
+def _is_found_to_roll(results: FlightResults) -> bool:
+    is_stated = results.metadata.get(WHY_THAT_VEHICLE, "").startswith("stated")
+    return results.metadata.get(KIND_OF_VEHICLE) == "rolls" and not is_stated
 
 
 def _against(gate: Gate, standstill: str) -> Iterator[Advice]:

@@ -16,7 +16,7 @@ from groundstation.chapters.wording import (
     with_full_stop,
 )
 from groundstation.systems.heading.answer import HeadingResult
-from groundstation.systems.heading.gates_answer import LEAVES_OPEN
+from groundstation.systems.heading.gates_answer import LEAVES_OPEN, UNPROVEN
 from groundstation.systems.heading.reason_answer import why_alone
 
 PUBLISHED_LIMIT_ARCMIN = 20.0
@@ -71,7 +71,21 @@ def to_enter(verdict: str, correction_deg: float | None, half_width: str, step_d
 def reasons(heading: HeadingResult) -> tuple[str, ...]:
     """Return why the verdict is what it is, failed side checks, and the error in words."""
     each = [with_full_stop(typeset(part)) for part in why_alone(heading.verdict_reason)]  # the headline says the rest
-    return tuple(filter(None, (*each, _in_words(heading), *steady_terms(heading), failed_to_inform(heading.gates))))
+    left = _left_out(heading)
+    return tuple(
+        filter(None, (*each, left, _in_words(heading), *steady_terms(heading), failed_to_inform(heading.gates)))
+    )
+
+
+def _left_out(heading: HeadingResult) -> str:
+    """Return how many straight epochs are left out.
+
+    Empty where none is, or where the reason of the verdict says it.
+    """
+    gate = next((one for one in heading.gates if one.name == UNPROVEN), None)
+    if heading.unproven_ground is None or gate is None or gate.state == "failed":
+        return ""
+    return with_full_stop(typeset(gate.reason))
 
 
 def half_width(ends: tuple[float, float]) -> str:

@@ -11,6 +11,11 @@ from groundstation.results.gates import Bound
 
 NextLine = Literal["Fly", "Record", "Check"]
 WHOLE, TAXI_ALONE, STANDSTILL_SPEED = "whole_half_width", "half_width", "standstill_speed_of_mean"
+UNPROVEN = "unproven_ground"
+STATE_THE_KIND = (
+    'the kind of vehicle: state vehicle = "rolls" in the aircraft file (--aircraft) if it never flies, all its '
+    "straight epochs then count"
+)
 REFLECTIONS = "the taxiway for reflections and gusts"
 HELD_MAX_S = 1.0  # a receiver is late by less
 
@@ -161,6 +166,15 @@ GATES: Mapping[str, GateKind] = {  # in the order in which a crew is told of the
             advice="weight on wheels",
             is_share=True,
             from_data_alone="taxi",
+            in_interval=False,
+        ),
+        GateKind(
+            UNPROVEN,
+            "gates that fail only with the straight epochs of unproven ground",
+            limit=(None, 0.0),
+            required="if_measured",
+            failed="{reason}",
+            advice=STATE_THE_KIND,
             in_interval=False,
         ),
         GateKind(
