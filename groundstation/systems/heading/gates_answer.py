@@ -16,6 +16,7 @@ STATE_THE_KIND = (
     'the kind of vehicle: state vehicle = "rolls" in the aircraft file (--aircraft) if it never flies, all its '
     "straight epochs then count"
 )
+LONGER = "taxi straight for longer"  # told with how long, or what limits instead
 REFLECTIONS = "the taxiway for reflections and gusts"
 HELD_MAX_S = 1.0  # a receiver is late by less
 
@@ -230,7 +231,7 @@ GATES: Mapping[str, GateKind] = {  # in the order in which a crew is told of the
             decided_by="half_width_decides",
             failed="heading error known to +- {value} only, +- {limit} needed",
             line="Fly",
-            advice="taxi straight for longer",
+            advice=LONGER,
             cured_by_more_data=True,
             still_teaches=True,
         ),
@@ -255,7 +256,7 @@ GATES: Mapping[str, GateKind] = {  # in the order in which a crew is told of the
             decided_by="precision_decides",
             failed="precision e {value}, at most {limit}",
             line="Fly",
-            advice="taxi straight for longer",
+            advice=LONGER,
             cured_by_more_data=True,
             still_teaches=True,
         ),
