@@ -49,9 +49,9 @@ def taxi_figures(seed: int = 3) -> tuple[FigureData, ...]:
     rate = np.gradient(turns, 0.1)
     gate = np.where(speed > 6.0, "used", "too slow").astype("U20")
     gate[(np.abs(rate) > 1.0) & (speed > 6.0)] = "turning"
-    gate[(time > 170.0) & (time < 173.0)] = "GNSS gap"
+    gate[(time > 170.0) & (time < 173.0)] = "no heading"
     used = gate == "used"
-    gone = gate == "GNSS gap"
+    gone = gate == "no heading"
     for values in (heading, track, speed, difference):
         values[gone] = np.nan
     segment = np.where(used, 1 + (time > 139.0) + (time > 205.0), 0)

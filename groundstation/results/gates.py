@@ -13,6 +13,7 @@ GateState = Literal["passed", "failed", "not_measured"]
 Sense = Literal["at_most", "at_least", "between"]
 Bound = tuple[float | None, float | None]  # lowest and highest value with which a gate passes
 STORED_STEP = 1e-6  # limits in summary.json are rounded to it
+NOT_PROVEN = "ground contact not proven for"  # so many epochs
 NO_CONTACT = "no GNSS epoch with ground contact proven"
 
 
@@ -84,4 +85,4 @@ def in_plain_words(reason: str) -> str:
     >>> in_plain_words("no straight taxi: of 9 epochs above 6 m/s before lift-off: not proven ground 9")
     'no straight taxi: of 9 epochs above 6 m/s before lift-off: ground contact not proven for 9'
     """
-    return reason.replace("not proven ground ", "ground contact not proven for ")
+    return reason.replace("not proven ground ", f"{NOT_PROVEN} ")

@@ -83,7 +83,7 @@ GATES: Final[dict[str, Colour]] = {
     "no ground run": DIM,
     "airborne": SKY,
     "not proven ground": GREY,
-    "GNSS gap": DIM,
+    "single epoch": DIM,
     "no heading": DIM,
     "geometry": ORANGE,
     "integrity": VERMILION,

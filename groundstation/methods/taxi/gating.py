@@ -14,6 +14,8 @@ from groundstation.results.chosen import Interval
 from groundstation.tables.phases import Phases
 
 NOT_TAXI = ("take-off run", "landing roll")  # phases, and reasons: power and wind crab the aircraft
+NOT_PROVEN = "not proven ground"  # reason of an epoch at taxi speed
+SINGLE = "single epoch"  # between epochs left out, or between two gaps: no straight segment has one
 CHANGING_MPS2 = 0.5  # a change of speed that is a run's, and not taxi's
 
 
@@ -23,7 +25,7 @@ def gate_samples(
     """Tell for every epoch why it is used or not, and number the straight segments.
 
     Later reasons give way to earlier ones: excluded, no heading, ground, geometry, integrity, too fast, too slow,
-    turning, take-off run, landing roll, outlier, GNSS gap. A forced interval overrides those from ``too fast`` on.
+    turning, take-off run, landing roll, outlier, single epoch. A forced interval overrides those from ``too fast`` on.
     """
     speed = samples.speed_mps
     gate = np.full(len(samples), USED, dtype=GATE_TEXT)
@@ -42,7 +44,7 @@ def gate_samples(
     gate[samples.integrity == 0.0] = "integrity"
     gate[samples.geometry > settings.geometry_max] = "geometry"
     if samples.ground_method:
-        gate[~samples.on_ground] = "not proven ground"
+        gate[~samples.on_ground] = NOT_PROVEN
         gate[~samples.on_ground & (speed > settings.taxi_speed_max_mps)] = "airborne"
     gate[~np.isfinite(samples.heading_deg)] = "no heading"
     for interval in intervals:
@@ -50,7 +52,7 @@ def gate_samples(
         if interval.use == "exclude":
             gate[inside] = "excluded"
     segment = _segments(samples, gate == USED, settings)
-    gate[(gate == USED) & (segment == 0)] = "GNSS gap"  # a single epoch between two gaps
+    gate[(gate == USED) & (segment == 0)] = SINGLE
     return replace(samples, gate=gate, segment=segment)
 
 

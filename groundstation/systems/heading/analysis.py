@@ -16,6 +16,7 @@ from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.columns import COLUMNS
 from groundstation.systems.heading.gates_answer import LIMITS
 from groundstation.systems.heading.settings import HeadingRequest, HeadingSettings
+from groundstation.systems.heading.wording import left_out_told
 from groundstation.systems.known import Known
 
 if TYPE_CHECKING:
@@ -111,9 +112,10 @@ def _sentence(answers: Answers) -> str:
     if heading.confidence95_measured_deg is not None:
         low, high = heading.confidence95_measured_deg
         text += f" ({low:+.3f} to {high:+.3f} without steady sideslip)"
+    left = "" if heading.unproven_ground is None else f"; {left_out_told(heading.unproven_ground)}"
     if heading.correction_deg is not None:
-        return f"{text}, enter {heading.correction_deg:+g} deg"
-    return f"{text} ({heading.verdict_reason})"
+        return f"{text}, enter {heading.correction_deg:+g} deg{left}"
+    return f"{text} ({heading.verdict_reason}){'' if left[2:] in heading.verdict_reason else left}"
 
 
 def _on_ground(known: Known) -> HeadingOnGround:

@@ -82,6 +82,20 @@ def seconds_of_segments(spans_s: Iterable[tuple[float, float]], interval_s: floa
 
 
 @dataclass(frozen=True)
+class UnprovenGround:
+    """Straight epochs left out because nothing proves ground contact.
+
+    Of a vehicle that is found to roll, and not stated to, the error by all of them stands beside.
+    """
+
+    schema_name: ClassVar[str] = "unproven_ground"
+
+    epochs: int  #: Straight epochs at taxi speed left out.
+    straight: int  #: Straight epochs in all: these and those used.
+    error_deg: float | None = None  #: Heading error with them; null where the vehicle is not found to roll.
+
+
+@dataclass(frozen=True)
 class HeadingStep:
     """Step of the INS heading: flight time of the first sample after it, and its size.
 
@@ -304,6 +318,8 @@ class HeadingResult(Answer, OnTaxi, HeadingByTrack, LatencyByTurns):
     steps: tuple[HeadingStep, ...] = ()
     reference_time_s: float | None = None
     by_states: HeadingByStates | None = None
+    #: Straight epochs left out for want of proof of ground contact; null where there are none.
+    unproven_ground: UnprovenGround | None = None
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
 

@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping
 
+from groundstation.base.angles import wrap_180
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.chapters.gates import VERDICTS, failed_to_inform
 from groundstation.chapters.parts import Claim, Rank
 from groundstation.chapters.wording import (
     ABSENT,
+    clock,
     interval,
     is_number,
     number,
@@ -16,7 +18,7 @@ from groundstation.chapters.wording import (
     with_full_stop,
 )
 from groundstation.systems.heading.answer import HeadingResult
-from groundstation.systems.heading.gates_answer import LEAVES_OPEN
+from groundstation.systems.heading.gates_answer import LEAVES_OPEN, UNPROVEN
 from groundstation.systems.heading.reason_answer import why_alone
 
 PUBLISHED_LIMIT_ARCMIN = 20.0
@@ -71,7 +73,21 @@ def to_enter(verdict: str, correction_deg: float | None, half_width: str, step_d
 def reasons(heading: HeadingResult) -> tuple[str, ...]:
     """Return why the verdict is what it is, failed side checks, and the error in words."""
     each = [with_full_stop(typeset(part)) for part in why_alone(heading.verdict_reason)]  # the headline says the rest
-    return tuple(filter(None, (*each, _in_words(heading), *steady_terms(heading), failed_to_inform(heading.gates))))
+    left = _left_out(heading)
+    return tuple(
+        filter(None, (*each, left, _in_words(heading), *steady_terms(heading), failed_to_inform(heading.gates)))
+    )
+
+
+def _left_out(heading: HeadingResult) -> str:
+    """Return how many straight epochs are left out.
+
+    Empty where none is, or where the reason of the verdict says it.
+    """
+    gate = next((one for one in heading.gates if one.name == UNPROVEN), None)
+    if heading.unproven_ground is None or gate is None or gate.state == "failed":
+        return ""
+    return with_full_stop(typeset(gate.reason))
 
 
 def half_width(ends: tuple[float, float]) -> str:
@@ -137,15 +153,27 @@ def _in_words(heading: HeadingResult) -> str:
 def figures(heading: HeadingResult) -> tuple[tuple[str, str, str], ...]:
     """Return the figures that decide, each with what it rests on."""
     samples, taxi = plural(heading.samples, "sample"), number(heading.taxi_seconds, 0, "s")
-    shown, sigma = number(heading.parking_ins_heading_deg, 2, "°"), number(heading.parking_sigma_deg, 2, "°")
     remark = f"95 % interval {interval(heading.confidence95_deg, 3, '°')}"
     found = (
         ("Heading error", number(heading.error_deg, 3, "°", signed=True), remark),
         ("Precision e", number(heading.precision_deg, 3, "°"), f"{samples}, {taxi} of straight taxi"),
-        ("Parking heading, corrected", number(heading.parking_heading_deg, 2, "°"), f"INS showed {shown}; σ {sigma}"),
+        ("Parking heading, corrected", number(heading.parking_heading_deg, 2, "°"), _parked(heading)),
         _against_reference(heading),
     )
     return tuple(figure for figure in found if figure[1] != ABSENT)
+
+
+def _parked(heading: HeadingResult) -> str:
+    """Return the heading shown and when, and the error then beside that on taxi."""
+    stood, sigma = heading.standstill, number(heading.parking_sigma_deg, 2, "°")
+    when = "" if stood is None else f" at {clock(stood.start_s)} – {clock(stood.end_s)}"
+    shown = f"INS showed {number(heading.parking_ins_heading_deg, 2, '°')}{when}"
+    if not is_number(heading.parking_ins_heading_deg) or not is_number(heading.parking_heading_deg):
+        return f"{shown}; σ {sigma}"
+    there = wrap_180(heading.parking_ins_heading_deg - heading.parking_heading_deg)
+    then, on_taxi = (number(float(one), 2, "°", signed=True) for one in (there, heading.error_deg))
+    at = "" if heading.reference_time_s is None else f" at {clock(heading.reference_time_s)}"
+    return f"{shown}; its error then {then}, on taxi{at} {on_taxi}; σ {sigma}"
 
 
 def _against_reference(heading: HeadingResult) -> tuple[str, str, str]:

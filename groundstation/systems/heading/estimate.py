@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -13,7 +14,8 @@ from groundstation.systems.heading.settings import HeadingRequest, HeadingSettin
 from groundstation.systems.heading.solution import solve
 from groundstation.systems.heading.steady import steady_prior
 from groundstation.systems.heading.steps import heading_steps
-from groundstation.systems.heading.taxi import taxi_of_flight
+from groundstation.systems.heading.taxi import StraightTaxi, taxi_of_flight
+from groundstation.systems.heading.unproven_ground import is_found_to_roll, is_left_out, on_ground_throughout
 from groundstation.systems.known import AircraftData, SiteData
 from groundstation.tables.phases import Phases
 from groundstation.tables.table import Flight
@@ -49,7 +51,8 @@ def estimate_heading_error(
     latencies : Delays, optional
         Where that of GNSS behind the INS is observed, GNSS times are put back by it; the aircraft file's comes first.
     phases : Phases, optional
-        Phases of the flight: take-off run and landing roll are not taxi and not used.
+        Phases of the flight: take-off run and landing roll are not taxi and not used. Where they find, and nobody
+        states, that the vehicle rolls, straight epochs of unproven ground are heard: the gate ``unproven_ground``.
     weather : iterable of str
         METAR lines: the wind of the one nearest in time is used where the log has none.
 
@@ -75,16 +78,40 @@ def estimate_heading_error(
     """
     settings, aircraft = settings or HeadingSettings(), aircraft or AircraftData()
     site, request = site or SiteData(), request or HeadingRequest()
-    taxi = taxi_of_flight(
+    chosen = partial(
+        taxi_of_flight,
         flight,
         settings=settings,
         aircraft=aircraft,
         request=request,
-        on_ground=on_ground,
         heading=heading,
         latencies=latencies,
         phases=phases,
     )
+    judged = partial(
+        _answer, flight, heading=heading, settings=settings, aircraft=aircraft, site=site, weather=tuple(weather)
+    )
+    taxi, whole = chosen(on_ground=on_ground), None
+    if is_found_to_roll(phases) and is_left_out(taxi.samples, settings).any():
+        whole = judged(chosen(on_ground=on_ground_throughout))
+    return judged(taxi, whole=whole)
+
+
+def _answer(
+    flight: Flight,
+    taxi: StraightTaxi,
+    *,
+    heading: HeadingOf | None,
+    settings: HeadingSettings,
+    aircraft: AircraftData,
+    site: SiteData,
+    weather: tuple[str, ...],
+    whole: HeadingResult | None = None,
+) -> HeadingResult:
+    """Return the answer by the samples of a taxi.
+
+    ``whole`` is that with its epochs of unproven ground.
+    """
     antenna, standstill, delay = taxi.samples, taxi.standstill, taxi.delay
     span_s = tuple(float(time_s) for time_s in antenna.time_s[antenna.is_used][[0, -1]])
     steady = steady_prior(flight, span_s, aircraft, settings, site, weather)
@@ -94,7 +121,7 @@ def estimate_heading_error(
         offset_s = min(offset_s, delay.sigma_s)
     at_rate = replace(settings, offset_prior_sigma_s=offset_s)  # a slow receiver is later, and differs more
     solution = solve(antenna, standstill, aircraft, at_rate, steady, steps)
-    result = build_answer(flight, taxi.topics, solution, standstill, settings, aircraft, site, steady)
+    result = build_answer(flight, taxi.topics, solution, standstill, settings, aircraft, site, steady, whole)
     if delay is None:
         return result
     return replace(

@@ -11,6 +11,12 @@ from groundstation.results.gates import Bound
 
 NextLine = Literal["Fly", "Record", "Check"]
 WHOLE, TAXI_ALONE, STANDSTILL_SPEED = "whole_half_width", "half_width", "standstill_speed_of_mean"
+UNPROVEN = "unproven_ground"
+STATE_THE_KIND = (
+    'the kind of vehicle: state vehicle = "rolls" in the aircraft file (--aircraft) if it never flies, all its '
+    "straight epochs then count"
+)
+LONGER = "taxi straight for longer"  # told with how long, or what limits instead
 REFLECTIONS = "the taxiway for reflections and gusts"
 HELD_MAX_S = 1.0  # a receiver is late by less
 
@@ -164,6 +170,15 @@ GATES: Mapping[str, GateKind] = {  # in the order in which a crew is told of the
             in_interval=False,
         ),
         GateKind(
+            UNPROVEN,
+            "gates that fail only with the straight epochs of unproven ground",
+            limit=(None, 0.0),
+            required="if_measured",
+            failed="{reason}",
+            advice=STATE_THE_KIND,
+            in_interval=False,
+        ),
+        GateKind(
             "ins_mode",
             "changes of INS mode from the end of standstill to the end of taxi",
             limit=(None, 0.0),
@@ -216,7 +231,7 @@ GATES: Mapping[str, GateKind] = {  # in the order in which a crew is told of the
             decided_by="half_width_decides",
             failed="heading error known to +- {value} only, +- {limit} needed",
             line="Fly",
-            advice="taxi straight for longer",
+            advice=LONGER,
             cured_by_more_data=True,
             still_teaches=True,
         ),
@@ -241,7 +256,7 @@ GATES: Mapping[str, GateKind] = {  # in the order in which a crew is told of the
             decided_by="precision_decides",
             failed="precision e {value}, at most {limit}",
             line="Fly",
-            advice="taxi straight for longer",
+            advice=LONGER,
             cured_by_more_data=True,
             still_teaches=True,
         ),

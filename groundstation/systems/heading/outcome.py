@@ -24,6 +24,7 @@ from groundstation.systems.heading.settings import HeadingSettings
 from groundstation.systems.heading.solution import Solution
 from groundstation.systems.heading.standstill import StandstillData
 from groundstation.systems.heading.steady import SteadyPrior
+from groundstation.systems.heading.unproven_ground import count_left_out
 from groundstation.systems.heading.verdict import JudgedValues, build_gates, decide, explain, round_to_step
 from groundstation.systems.known import AircraftData, SiteData
 from groundstation.tables.sources import said_of
@@ -76,11 +77,17 @@ def build_answer(
     aircraft: AircraftData,
     site: SiteData,
     steady: SteadyPrior,
+    whole: HeadingResult | None = None,
 ) -> HeadingResult:
-    """Judge a solution and set it beside its references. ``topics`` are those of INS and GNSS."""
+    """Judge a solution and set it beside its references.
+
+    ``topics`` are those of INS and GNSS; ``whole`` is the answer with the straight epochs of unproven ground.
+    """
     error = _error_of(solution, steady)
     assessed = _assessed(standstill, solution.posterior)
+    unproven = count_left_out(solution.samples, settings, whole)
     values = _judged_values(flight, topics[0], solution, assessed, settings, error)
+    values = replace(values, unproven_ground=unproven, whole=whole, interval_deg=error.whole_interval_deg)
     gates = build_gates(solution.samples, assessed, values, settings)
     verdict, deciding = decide(gates, assessed, settings)
     step_deg, running = aircraft.entry_step_deg, solution.running
@@ -113,6 +120,7 @@ def build_answer(
         wander_spread_deg=solution.posterior.parameter("wander_deg"),
         wander_s=solution.posterior.parameter("wander_s"),
         steps=solution.steps,
+        unproven_ground=unproven,
         settings=_settings_of(settings, aircraft),
         figures=_figures_of(solution, standstill, settings, error.common_sigma_deg),
     )

@@ -4,10 +4,12 @@ Difference over time, density, convergence, heading and track, estimates by segm
 """
 
 from collections.abc import Mapping
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
+from groundstation.base.angles import wrap_180
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.chapters.plots.common import label, lane_roles, positive
 from groundstation.chapters.wording import clock, is_number, number
@@ -44,6 +46,7 @@ Windows = tuple[tuple[float, float], ...]
 TAXI_SPEED_MARGIN = 1.6  # the take-off run leaves the plot, or the taxi would be a line at its foot
 SLOWEST_TRACK_MPS = 1.0  # below it the direction of motion is noise and is not drawn
 MOST_LANES, MOST_SEGMENTS, MOST_DIRECTIONS = 12, 24, 8
+FARTHEST_SHOWN = 8  # of the segments shown, where there are more than fit: these, and the first others
 LANE_MM, ROW_MM = 4.6, 5.2
 
 
@@ -240,9 +243,12 @@ def forest(results: FlightResults) -> Plot | None:
     answer = results.answer(HeadingResult)
     if answer is None or not answer.segments:
         return None
-    segments, shown = answer.segments, answer.segments[:MOST_SEGMENTS]
+    segments, by_distance = answer.segments, _farthest_first(answer)
+    farthest = by_distance[:FARTHEST_SHOWN]
+    others = (place for place in range(len(segments)) if place not in farthest)
+    shown = sorted((*farthest, *islice(others, max(MOST_SEGMENTS - len(farthest), 0))))
     listed: list[tuple[str, TaxiSegment, Role]] = [
-        (_segment_name(index, item), item, "answer") for index, item in enumerate(shown, 1)
+        (_segment_name(place + 1, segments[place]), segments[place], "answer") for place in shown
     ]
     listed += [(_direction_name(item), item, "ins") for item in answer.directions[:MOST_DIRECTIONS]]
     marks: list[AnyMark] = [*_whole_run(answer, len(listed))]
@@ -254,7 +260,12 @@ def forest(results: FlightResults) -> Plot | None:
     titles = [*(label(name, 60) for name, _, _ in listed), "whole run"]
     names = tuple((float(row), title) for row, title in enumerate(titles))
     y = Axis(low=len(listed) + 0.6, high=-0.6, names=names)
-    more = f" The first {len(shown)} of {len(segments)} segments." if len(shown) < len(segments) else ""
+    more = f" {len(shown)} of {len(segments)} segments." if len(shown) < len(segments) else ""
+    if len(segments) > 1 and by_distance:
+        worst = segments[by_distance[0]]
+        off = number(wrap_180(worst.error_deg - answer.error_deg), 2, "°", signed=True)
+        span = f"{clock(worst.start_s)} – {clock(worst.end_s)}"
+        more += f" Farthest off by its σ: {by_distance[0] + 1}, {span}, by {off}."
     blue = "; blue: directions of travel" if answer.directions else ""
     return Plot(
         "heading.forest",
@@ -264,6 +275,23 @@ def forest(results: FlightResults) -> Plot | None:
         "Forest plot of the heading error by segment and by direction.",
         one_panel(Panel(marks, Axis("heading error, °"), y, legend=""), 2.0 + ROW_MM * (len(listed) + 1)),
     )
+
+
+def _farthest_first(answer: HeadingResult) -> list[int]:
+    """Return the places of the segments, that farthest from the whole run by its sigma first."""
+    known = [
+        place
+        for place, item in enumerate(answer.segments)
+        if is_number(item.error_deg) and is_number(item.sigma_deg) and item.sigma_deg > 0.0
+    ]
+    if not is_number(answer.error_deg):
+        return []
+
+    def distance(place: int) -> float:
+        item = answer.segments[place]
+        return abs(float(wrap_180(item.error_deg - answer.error_deg))) / item.sigma_deg
+
+    return sorted(known, key=distance, reverse=True)
 
 
 def _whole_run(answer: HeadingResult, row: int) -> list[AnyMark]:

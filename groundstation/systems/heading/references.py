@@ -102,6 +102,28 @@ def shrunk_drift(prior_sigma_deg_per_h: float, *measured: tuple[float, float] | 
     return sum(drift * part for drift, part in known) / weight, float(weight**-0.5)
 
 
+def lasting_drift(
+    standing: tuple[float, float] | None, on_taxi: tuple[float, float] | None, prior_sigma_deg_per_h: float
+) -> tuple[float, float] | None:
+    """Return the slope at standstill where it may be that of the whole time, else None.
+
+    An INS that settles, or that two antennas correct, turns as it stands and stops to. Its slope there differs from
+    that on taxi, or where that is not known from 0 +- the prior, by more than three sigma. The sigma returned allows
+    for a drift in motion that is another by a share of the prior.
+
+    Examples
+    --------
+    >>> lasting_drift((43.5, 3.0), (-0.4, 0.8), 5.0) is None, lasting_drift((43.5, 3.0), (40.0, 30.0), 5.0) is None
+    (True, False)
+    """
+    if standing is None:
+        return None
+    sigma = float(np.hypot(standing[1], HELD_SHARE * prior_sigma_deg_per_h))
+    expected, expected_sigma = on_taxi or (0.0, prior_sigma_deg_per_h)
+    is_apart = abs(standing[0] - expected) > CONFLICT_SIGMAS * float(np.hypot(sigma, expected_sigma))
+    return None if is_apart else (standing[0], sigma)
+
+
 def site_reference(site: SiteData) -> ParkedHeading | None:
     """Reference of the stand that the user's site file names."""
     stand = site.parked_on()
@@ -192,7 +214,8 @@ def parking_heading(
 
     heading = INS heading there - (error - drift x (t_taxi - t_parking)), because the error at parking was smaller than
     the error on taxi by what it drifted in between. The drift is that of :func:`shrunk_drift`, from the slope on taxi
-    and from that at standstill, which may be another than in motion by a share of the prior.
+    and from that at standstill where that lasts (:func:`lasting_drift`). Where it does not, the spread of the heading
+    there is in the sigma.
 
     Parameters
     ----------
@@ -206,15 +229,17 @@ def parking_heading(
     if not in_interval.any() or not np.isfinite(samples.heading_deg[in_interval]).any():
         return Parking(reference_deg=reference)
     shown = mean_heading(samples.heading_deg[in_interval])
-    standing = standstill_drift(samples.time_s[in_interval], samples.heading_deg[in_interval])
-    if standing is not None:
-        standing = standing[0], float(np.hypot(standing[1], HELD_SHARE * drift_prior_deg_per_h))
+    turning = standstill_drift(samples.time_s[in_interval], samples.heading_deg[in_interval])
     on_taxi = None if drift[0] is None or drift[1] is None else (drift[0], drift[1])
+    standing = lasting_drift(turning, on_taxi, drift_prior_deg_per_h)
     rate, rate_sigma = shrunk_drift(drift_prior_deg_per_h, on_taxi, standing)
+    moved = turning is not None and standing is None
+    spread = float(np.nanstd(wrap_180(samples.heading_deg[in_interval] - shown))) if moved else 0.0
     hours = (error[2] - float(np.mean(samples.time_s[in_interval]))) / 3600.0
     corrected = float(wrap_360(shown - (error[0] - rate * hours)))
     residual = None if reference is None else float(wrap_180(corrected - reference)) * ARCMIN_PER_DEG
-    return Parking(shown, corrected, float(np.hypot(error[1], rate_sigma * hours)), reference, residual)
+    sigma = float(np.sqrt(error[1] ** 2 + (rate_sigma * hours) ** 2 + spread**2))
+    return Parking(shown, corrected, sigma, reference, residual)
 
 
 def runway_checks(

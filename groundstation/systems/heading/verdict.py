@@ -12,19 +12,21 @@ from groundstation.methods.taxi.gating import NOT_TAXI, is_straight_and_fast
 from groundstation.methods.taxi.samples import VELOCITY_SIGMA, TaxiSamples
 from groundstation.results.gates import Bound, Gate, judged_gate
 from groundstation.results.rules import Rejudged
-from groundstation.systems.heading.answer import HeadingResult, HeadingStep, Standstill, Verdict
+from groundstation.systems.heading.answer import HeadingResult, HeadingStep, Standstill, UnprovenGround, Verdict
 from groundstation.systems.heading.checks import Disagreement, VarianceRatio
 from groundstation.systems.heading.gates_answer import (
     CURED_BY_MORE_DATA,
     GATES,
     STANDSTILL_SPEED,
     TAXI_ALONE,
+    UNPROVEN,
     WHOLE,
     GateKind,
 )
 from groundstation.systems.heading.normality import Normality, normality_limits
 from groundstation.systems.heading.reason_answer import ALL_PASSED, BETWEEN, ENTER, IF_ENOUGH, NOT_ENTERED, good_to
 from groundstation.systems.heading.settings import HeadingSettings
+from groundstation.systems.heading.unproven_ground import objections, reason_of
 from groundstation.systems.heading.wording import told
 
 PAPER_RATE_HZ, LEAST_RATE_HZ = 10.0, 0.2
@@ -37,7 +39,8 @@ class JudgedValues:
     """Values that the gates judge, beside those of the samples. None: could not be measured.
 
     ``half_width_deg`` is that of the interval from this taxi alone, ``whole_half_width_deg`` that with the steady
-    terms, whose sigma is ``steady_sigma_deg``.
+    terms, whose sigma is ``steady_sigma_deg``; ``interval_deg`` is that whole interval. ``whole`` is the answer with
+    the epochs of ``unproven_ground``, where it was asked for.
     """
 
     taxi_seconds: float
@@ -54,6 +57,9 @@ class JudgedValues:
     disagreement: Disagreement | None = None
     steps: tuple[HeadingStep, ...] = ()
     held_s: float | None = None
+    unproven_ground: UnprovenGround | None = None
+    whole: HeadingResult | None = None
+    interval_deg: tuple[float, float] = (float("nan"), float("nan"))
 
 
 def gate_bounds(settings: HeadingSettings, samples: int, rate_hz: float = PAPER_RATE_HZ) -> dict[str, Bound]:
@@ -133,14 +139,23 @@ def build_gates(
     rate_hz = 1.0 / samples.interval_s if samples.interval_s > 0.0 else PAPER_RATE_HZ
     bounds = gate_bounds(settings, int(samples.is_used.sum()), rate_hz)
     judge = _Judge(bounds, _required_by(settings))
-    return (
-        *_throughout_gates(samples, values, settings, judge),
+    throughout = _throughout_gates(samples, values, settings, judge)
+    later = (
         *_standstill_gates(standstill, judge),
         *_taxi_gates(samples, settings, judge),
         *_accuracy_gates(samples, values, judge),
         *_normality_gates(values.normality, judge),
         *_steadiness_gates(values, judge),
     )
+    return (*throughout, _unproven_gate((*throughout, *later), values, judge), *later)
+
+
+def _unproven_gate(others: tuple[Gate, ...], values: JudgedValues, judge: _Judge) -> Gate:
+    """Judge what the straight epochs of unproven ground say against the others."""
+    if values.unproven_ground is None:
+        return judge(UNPROVEN, 0.0, "no straight epoch is left out for it")
+    found = objections(others, values.interval_deg, values.whole)
+    return judge(UNPROVEN, None if found is None else float(found.count), reason_of(values.unproven_ground, found))
 
 
 def _throughout_gates(

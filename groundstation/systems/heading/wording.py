@@ -3,7 +3,9 @@
 What people can see for themselves comes first.
 """
 
+from groundstation.base.words import counted
 from groundstation.results.gates import Gate
+from groundstation.systems.heading.answer import UnprovenGround
 from groundstation.systems.heading.gates_answer import GATES
 from groundstation.systems.heading.reason_answer import BETWEEN
 
@@ -21,6 +23,17 @@ def told(gates: tuple[Gate, ...]) -> str:
     order = list(GATES)
     ranked = sorted(gates, key=lambda gate: order.index(gate.name) if gate.name in GATES else len(order))
     return BETWEEN.join(_told(gate) for gate in ranked)
+
+
+def left_out_told(left: UnprovenGround) -> str:
+    """Straight epochs left out, of how many.
+
+    Examples
+    --------
+    >>> left_out_told(UnprovenGround(440, 621))
+    '440 of 621 straight epochs left out as ground is not proven'
+    """
+    return f"{left.epochs} of {counted(left.straight, 'straight epoch')} left out as ground is not proven"
 
 
 def _told(gate: Gate) -> str:

@@ -16,7 +16,7 @@ from groundstation.simulation.taxi_disturbance import Disturbance
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.estimate import estimate_heading_error
 from groundstation.systems.heading.figures import IN_PAUSE
-from groundstation.systems.heading.references import reference_findings
+from groundstation.systems.heading.references import lasting_drift, reference_findings
 from groundstation.systems.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.systems.known import AircraftData, SiteData, Stand
 from groundstation.tables.phases import flight_phases, ground_mask
@@ -693,6 +693,23 @@ def test_parking_heading_of_an_ins_that_drifts_holds_the_truth(drift_deg_per_h: 
     truth = float(np.mean(run.heading_deg[(run.ins_time_s > 150.0) & (run.ins_time_s < 198.0)]))
     assert found.parking_heading_deg == pytest.approx(truth, abs=2.0 * (found.parking_sigma_deg or 0.0))
     assert found.parking_heading_deg == pytest.approx(truth, abs=0.15)
+
+
+def test_a_heading_that_settles_at_standstill_is_no_drift_of_the_taxi() -> None:
+    """Turned by 0.3 deg within 24 s as it stands, 45 deg/h, and by nothing on taxi: 500 s later not by 6 deg."""
+    time_s = np.arange(25.0)
+    assert lasting_drift((45.0, 3.0), (-0.4, 0.8), 5.0) is None
+    run = run_of(noiseless(replace(CASE, drift_deg_per_h=0.0)))
+    flight = taxi_flight(run)
+    first_s = run.ins_time_s[0] + 60.0  # the end of the standstill
+    settling = np.interp(run.ins_time_s, [first_s - 30.0, first_s], [-0.3, 0.0])
+    found = estimate(
+        with_column(flight, "ins", "true_heading_deg", wrap_360(flight["ins"].values("true_heading_deg") + settling)),
+    )
+    shown = found.parking_ins_heading_deg
+    assert shown is not None and found.parking_heading_deg is not None
+    assert wrap_180(shown - found.parking_heading_deg) == pytest.approx(found.error_deg, abs=0.02)
+    assert (found.parking_sigma_deg or 0.0) > np.std(0.3 / 30.0 * time_s), "the heading turned while it was read"
 
 
 def test_a_car_is_always_on_the_ground(flight: Flight) -> None:

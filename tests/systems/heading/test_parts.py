@@ -189,6 +189,17 @@ def test_outliers_of_tens_of_degrees_are_left_out_and_nothing_else() -> None:
     assert np.flatnonzero(gated.gate == "outlier").tolist() == hit.tolist()
 
 
+def test_an_epoch_alone_between_turns_is_named_for_what_it_is() -> None:
+    flight = taxi_flight(simulate_taxi(TWO_TURNS, np.random.default_rng(0)))
+    pair = pair_samples(flight, "ins", "gnss", settings=SETTINGS)
+    used = np.flatnonzero(gate_samples(pair, SETTINGS).is_used)
+    alone = int(used[300])
+    ends = [float(pair.time_s[alone + step]) for step in (-100, -1, 1, 100)]
+    gated = gate_samples(pair, SETTINGS, (Interval(*ends[:2], "exclude"), Interval(*ends[2:], "exclude")))
+    assert gated.gate[alone] == "single epoch"
+    assert not np.char.find(gated.gate, "gap").max() >= 0, "no epoch is missing"
+
+
 def test_gnss_gap_closes_the_segment() -> None:
     flight = taxi_flight(simulate_taxi(TaxiCase(sway_sigma_deg=0.0), np.random.default_rng(0)))
     gnss = flight["gnss"]
