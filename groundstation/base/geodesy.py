@@ -102,11 +102,11 @@ def continuous_longitude_deg(longitude_deg: ArrayLike) -> FloatArray:
 def north_east_m(
     latitude_deg: ArrayLike,
     longitude_deg: ArrayLike,
-    origin_latitude_deg: float,
-    origin_longitude_deg: float,
+    origin_latitude_deg: FloatArray | float,
+    origin_longitude_deg: FloatArray | float,
     altitude_m: float = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
-    """Displacements from an origin in metres north and east, good to 0.1 % within 50 km.
+    """Displacements from an origin, or each from its own, in metres north and east, good to 0.1 % within 50 km.
 
     The date line is crossed as if it were not there. An impossible position (a latitude beyond 90 deg, a longitude
     beyond a turn) has NaN.

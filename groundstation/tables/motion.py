@@ -1,6 +1,6 @@
 """Motion of a flight on a coarse, even grid of times, for the ground detector and phases."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -98,8 +98,7 @@ def motion_of(flight: Flight) -> Motion:
     speed = np.where(np.isfinite(speed), speed, on_grid(flight, fast, horizontal_speed_mps, size))
     true_heading, magnetic = ins.values("true_heading_deg"), ins.values("magnetic_heading_deg")
     heading = true_heading if np.isfinite(true_heading).any() else magnetic
-    placed = (first_of_kind(flight, kind, *PLACE) for kind in ("gnss", "ins"))
-    north, east = _positions(flight, *placed, size)
+    north, east = _positions(flight, [first_of_kind(flight, kind, *PLACE) for kind in ("gnss", "ins")], size)
     moving = np.nan_to_num(speed, nan=0.0)
     return Motion(
         speed,
@@ -209,8 +208,8 @@ def _displaced(origin_deg: tuple[float, float], axis: int) -> Values:
     return values
 
 
-def _positions(flight: Flight, gnss: Table, ins: Table, size: int) -> tuple[FloatArray, FloatArray]:
-    for table in (gnss, ins):
+def _positions(flight: Flight, tables: Sequence[Table], size: int) -> tuple[FloatArray, FloatArray]:
+    for table in tables:
         known = table.valid("latitude_deg", "longitude_deg")
         if known.any():
             latitude, longitude = table.values("latitude_deg"), table.values("longitude_deg")
