@@ -9,7 +9,7 @@ import pytest
 
 from groundstation.base.clock import Clock
 from groundstation.base.findings import Finding
-from groundstation.base.ledger import DamageEntry, Ledger, RemarkEntry
+from groundstation.base.ledger import DamageEntry, GapDefinition, Ledger, RemarkEntry
 from groundstation.chapters.findings import findings
 from groundstation.chapters.gates import gate_grid, limit_text
 from groundstation.chapters.overview import overview
@@ -299,6 +299,12 @@ def test_ledger_has_a_row_for_each_topic() -> None:
     assert (gnss["Coverage"], gnss["Longest gap, s"]) == ("99.0%", "28.10")
     assert (gnss["Gaps"], gnss["Duplicates"], gnss["Steps back"]) == ("2", "14", "1")
     assert "Stuck" not in titles, "a ledger without that column counts nothing of it"
+
+
+def test_the_table_of_topics_says_what_coverage_and_a_gap_are() -> None:
+    ledger = replace(example().ledger, gap_definition=GapDefinition(periods=3.0, min_s=0.2))
+    caption = grid(quality(replace(example(), ledger=ledger)), "Topics").caption
+    assert "Gap: from sample to sample, longer than 3 periods and 0.2 s; single missing samples" in caption
 
 
 def test_a_long_ledger_is_cut_and_says_so() -> None:
