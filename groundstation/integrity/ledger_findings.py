@@ -84,7 +84,10 @@ def _often(found: tuple[Pause, ...], clock: ClockModel) -> tuple[str, str]:
 
 
 def _own_gaps(topic: TopicCounts, stops: tuple[Pause, ...]) -> Gaps:
-    """Return the gaps of a topic that stops of the whole log do not explain: more than a usual step is left."""
+    """Return the gaps of a topic that stops of the whole log do not explain.
+
+    More than a step that is no gap is left of them.
+    """
     if not stops or not len(topic.gaps):
         return topic.gaps
     start_ns, length_s = topic.gaps.start_ns, topic.gaps.length_s

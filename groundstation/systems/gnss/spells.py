@@ -62,7 +62,10 @@ def spells_of(one: ReceiverRows, others_s: Sequence[FloatArray]) -> Spells:
 
 
 def _free(time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the times in which a sensor misses rows, from and to; before its first row and behind its last it does."""
+    """Return the times in which a sensor misses rows, from and to.
+
+    It does before its first row and behind its last.
+    """
     steps = np.diff(time_s)
     long = np.flatnonzero(steps > MISSES * float(np.median(steps))) if len(steps) else np.zeros(0, dtype=np.intp)
     start = np.concatenate(([-np.inf], time_s[long], time_s[-1:]))
