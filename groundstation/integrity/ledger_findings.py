@@ -132,7 +132,7 @@ def _topic(topic: TopicCounts, ledger: LedgerCounts) -> Iterator[Finding]:
             f"the longest {gaps.length_s[longest]:.1f} s after {place}"
         )
         if len(own) < len(gaps):
-            text += f"; {len(own)} its own, {own.length_s.sum():.1f} s, the others of the whole log"
+            text += f"; {len(gaps) - len(own)} of them stops of the whole log"
         severity: Severity = "warn" if is_canonical(topic.topic) else "info"  # nothing is estimated from raw topics
         yield Finding(severity, "data.gaps", text, topic.topic, place, len(gaps))
     for sequence in topic.sequences:

@@ -121,7 +121,7 @@ def _silent(one: GnssReceiver, settings: GnssSettings) -> list[Judged]:
     longest = max(gaps, key=lambda loss: loss.seconds)
     text = gaps_text([loss.seconds for loss in gaps]) + (_speed(longest) if len(gaps) == 1 else "")
     if len(gaps) < len(every):
-        text = f"{len(gaps)} of {len(every)} gaps of the receiver alone, {seconds_text(seconds)} together"
+        text = f"{len(gaps)} of {len(every)} gaps while other sensors have rows, {seconds_text(seconds)} together"
     grade: Grade = "warn" if share > settings.lost_share_warn else "good"
     return [Judged(grade, text, "silent", one.topic, f"at {longest.start_s:.1f} s", len(gaps))]
 
