@@ -100,8 +100,20 @@ def _topics(results: FlightResults) -> Grid | None:
     titles = ("Topic", "Rows", "Rate / nominal, Hz", "Coverage", "Longest gap, s", *(title for title, _ in counts))
     heads = [Head(title, title != "Topic") for title in titles]
     more = len(data) - len(rows)
-    caption = f"{counted(more, 'raw topic' if own else 'more topic')} in the table file." if more else ""
+    left_out = f"{counted(more, 'raw topic' if own else 'more topic')} in the table file." if more else ""
+    caption = " ".join(filter(None, (_definitions(results.ledger), left_out)))
     return Grid("Topics", heads, rows, caption, ("ledger",))
+
+
+def _definitions(ledger: Ledger) -> str:
+    """Return what coverage and a gap are, by the limits of the ledger."""
+    gap = ledger.gap_definition
+    if not gap.periods:
+        return ""
+    return (
+        "Coverage: samples that are there, of those that the nominal rate expects. Gap: from sample to sample, longer "
+        f"than {gap.periods:g} periods and {gap.min_s:g} s; single missing samples lower the coverage alone."
+    )
 
 
 def _pauses(ledger: Ledger) -> Grid | None:

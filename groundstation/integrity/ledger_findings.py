@@ -84,7 +84,10 @@ def _often(found: tuple[Pause, ...], clock: ClockModel) -> tuple[str, str]:
 
 
 def _own_gaps(topic: TopicCounts, stops: tuple[Pause, ...]) -> Gaps:
-    """Return the gaps of a topic without those that are stops of the whole log."""
+    """Return the gaps of a topic that stops of the whole log do not explain.
+
+    More than a step that is no gap is left of them.
+    """
     if not stops or not len(topic.gaps):
         return topic.gaps
     start_ns, length_s = topic.gaps.start_ns, topic.gaps.length_s
@@ -120,14 +123,16 @@ def _duplicates(topic: TopicCounts, clock: ClockModel, limits: DuplicateLimits) 
 def _topic(topic: TopicCounts, ledger: LedgerCounts) -> Iterator[Finding]:
     if topic.duplicates:
         yield _duplicates(topic, ledger.clock, ledger.thresholds.duplicates)
-    gaps = _own_gaps(topic, ledger.stops)
-    if len(gaps):
+    gaps, own = topic.gaps, _own_gaps(topic, ledger.stops)
+    if len(own):
         longest = int(gaps.length_s.argmax())
         place = ledger.clock.text(int(gaps.start_ns[longest]))
         text = (
             f"{topic.topic}: {counted(len(gaps), 'gap')}, {gaps.length_s.sum():.1f} s together, "
             f"the longest {gaps.length_s[longest]:.1f} s after {place}"
         )
+        if len(own) < len(gaps):
+            text += f"; {len(gaps) - len(own)} of them stops of the whole log"
         severity: Severity = "warn" if is_canonical(topic.topic) else "info"  # nothing is estimated from raw topics
         yield Finding(severity, "data.gaps", text, topic.topic, place, len(gaps))
     for sequence in topic.sequences:

@@ -10,7 +10,7 @@ import pytest
 
 from groundstation.base.clock import Clock
 from groundstation.base.findings import Finding
-from groundstation.base.ledger import DamageEntry, Ledger, RemarkEntry
+from groundstation.base.ledger import DamageEntry, GapDefinition, Ledger, RemarkEntry
 from groundstation.chapters.findings import findings
 from groundstation.chapters.gates import gate_grid, limit_text
 from groundstation.chapters.overview import overview
@@ -316,6 +316,12 @@ def test_a_raw_topic_with_gaps_stands_beside_the_figure_that_shows_them() -> Non
     table = grid(quality(replace(whole, figures=(raw,))), "Topics")
     place = [head.title for head in table.heads].index("Longest gap, s")
     assert [(row[0], row[place]) for row in table.rows] == [("gnss", "—"), ("raw.0", "2.00")]
+
+
+def test_the_table_of_topics_says_what_coverage_and_a_gap_are() -> None:
+    ledger = replace(example().ledger, gap_definition=GapDefinition(periods=3.0, min_s=0.2))
+    caption = grid(quality(replace(example(), ledger=ledger)), "Topics").caption
+    assert "Gap: from sample to sample, longer than 3 periods and 0.2 s; single missing samples" in caption
 
 
 def test_a_long_ledger_is_cut_and_says_so() -> None:

@@ -88,6 +88,15 @@ def test_the_same_silence_without_events_is_one_warning() -> None:
     assert len(ledger["ins"].gaps) == len(ledger["gnss"].gaps) == 1
 
 
+def test_gaps_of_a_topic_are_counted_once_and_stops_of_the_log_are_named() -> None:
+    ledger = found_in(log_of([], own={"gnss": [(20.0, 25.0)]}))
+    (finding,) = (one for one in ledger_findings(ledger) if one.code == "data.gaps")
+    entry = ledger.document().topics["gnss"].gaps
+    assert finding.count == entry.count == len(ledger["gnss"].gaps) == 2
+    assert finding.text.startswith(f"gnss: 2 gaps, {entry.total_s:.1f} s together, the longest 30.2 s after ")
+    assert finding.text.endswith("; 1 of them stops of the whole log")
+
+
 @pytest.mark.parametrize(
     ("own", "gap"),
     [

@@ -13,6 +13,7 @@ from groundstation.chapters.wording import clock, number, typeset, with_full_sto
 from groundstation.results.flight import FlightResults
 from groundstation.systems.gnss.answer import NOT_LOGGED as UNLOGGED
 from groundstation.systems.gnss.answer import (
+    WITHOUT_RECORD,
     FixLoss,
     GnssReceiver,
     GnssReception,
@@ -135,6 +136,8 @@ def _states(answer: GnssReception) -> Grid:
     is_paused = any(one.not_logged_s for one in answer.receivers)
     what = "the logged time" if is_paused else "time"
     caption = f"Shares are of {what}, from the first row to the last."
+    if any(state.state in WITHOUT_RECORD for one in answer.receivers for state in one.states):
+        caption += " As a state a gap begins one usual step behind its row; elsewhere it is from row to row."
     return Grid("States of the fix", heads, rows, caption, ("gnss_states",))
 
 

@@ -130,10 +130,10 @@ def _sentence(every: Sequence[GnssReceiver], main: GnssReceiver) -> str:
     return f"{main.topic}: {sentence_of(main)}{others}"
 
 
-def _others_s(flight: Flight) -> FloatArray | None:
-    """Return the times of the rows of all other sensors, sorted; None without any."""
+def _others_s(flight: Flight) -> tuple[FloatArray, ...]:
+    """Return the times of the rows of each other sensor, sorted."""
     topics = [topic for topic in flight.topics() if kind_of(topic) in OTHER_SENSORS and len(flight[topic])]
-    return np.sort(np.concatenate([flight.time_s(topic) for topic in topics])) if topics else None
+    return tuple(np.sort(flight.time_s(topic)) for topic in topics)
 
 
 def _one(
@@ -141,7 +141,7 @@ def _one(
     topic: str,
     phases: Phases,
     delays: Delays | None,
-    others_s: FloatArray | None,
+    others_s: Sequence[FloatArray],
     settings: GnssSettings,
 ) -> One:
     rows = series_of(flight, topic, settings)

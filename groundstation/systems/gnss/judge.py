@@ -5,11 +5,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.findings import Finding, Severity
-from groundstation.systems.gnss.answer import WITHOUT_FIX, FixLoss, GnssReceiver, Grade, ReceiverPair, StandstillScatter
+from groundstation.systems.gnss.answer import (
+    WITHOUT_FIX,
+    WITHOUT_RECORD,
+    FixLoss,
+    GnssReceiver,
+    Grade,
+    ReceiverPair,
+    StandstillScatter,
+)
 from groundstation.systems.gnss.series import ReceiverRows
 from groundstation.systems.gnss.settings import GnssSettings
 from groundstation.systems.gnss.wording_answer import (
     LATE_S,
+    gaps_text,
     length_text,
     memory_of,
     name_of,
@@ -101,16 +110,18 @@ def _lost(one: GnssReceiver, settings: GnssSettings) -> list[Judged]:
 def _silent(one: GnssReceiver, settings: GnssSettings) -> list[Judged]:
     """Judge gaps of the receiver's rows.
 
-    Where the whole log is silent they are not the receiver's.
+    Where the whole log is silent they are not the receiver's, and are told as the others of all its gaps.
     """
-    gaps = [loss for loss in one.losses if loss.state == "no_record"]
+    every = [loss for loss in one.losses if loss.state in WITHOUT_RECORD]
+    gaps = [loss for loss in every if loss.state == "no_record"]
     if not gaps:
         return []
     seconds = sum(loss.seconds for loss in gaps)
     share = seconds / max(one.end_s - one.start_s - one.not_logged_s, 1e-9)
     longest = max(gaps, key=lambda loss: loss.seconds)
-    times = f"{len(gaps)} times, {seconds_text(seconds)} in all" if len(gaps) > 1 else f"for {seconds_text(seconds)}"
-    text = f"nothing recorded {times}{_speed(longest) if len(gaps) == 1 else ''}"
+    text = gaps_text([loss.seconds for loss in gaps]) + (_speed(longest) if len(gaps) == 1 else "")
+    if len(gaps) < len(every):
+        text = f"{len(gaps)} of {len(every)} gaps while other sensors have rows, {seconds_text(seconds)} together"
     grade: Grade = "warn" if share > settings.lost_share_warn else "good"
     return [Judged(grade, text, "silent", one.topic, f"at {longest.start_s:.1f} s", len(gaps))]
 

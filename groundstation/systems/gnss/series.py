@@ -17,6 +17,7 @@ from groundstation.systems.gnss.settings import GnssSettings
 from groundstation.tables.gaps import largest_step_s
 from groundstation.tables.table import Flight, Table
 
+ROUNDING_S = 1e-6  # of flight seconds: a step of exactly the limit is no gap
 BURSTS, BURST_QUANTILE = 1.5, 0.9  # a step longer than most by so much is a gap
 REGULAR_SHARE, REGULAR_STEP = 0.8, 0.2  # steps within so much of the usual one make epochs that can be missed
 FIX_WITHOUT_INTEGRITY = ("none", "2d", "dead_reckoning", "other")  # of which a receiver never vouches
@@ -138,9 +139,10 @@ def series_of(flight: Flight, topic: str, settings: GnssSettings) -> ReceiverRow
     time_s = flight.seconds(table.time_ns)
     steps = np.diff(flight.seconds(logged_ns(table.time_ns, flight.pauses)))
     step_s = float(np.median(steps)) if len(steps) else np.nan
-    gap_s = largest_step_s(table.time_ns, settings.gap_steps, settings.gap_min_s)
-    if len(steps):  # of rows that come in bursts
-        gap_s = max(gap_s, BURSTS * float(np.quantile(steps, BURST_QUANTILE)))
+    gap_s = largest_step_s(table.time_ns, settings.gap_steps, settings.gap_min_s) + ROUNDING_S
+    most_s = float(np.quantile(steps, BURST_QUANTILE)) if len(steps) else 0.0
+    if most_s > gap_s:  # rows come in bursts
+        gap_s = BURSTS * most_s
     usual_s = step_s if np.isfinite(step_s) else 0.0
     paused_s = flight.seconds(np.array(flight.pauses, dtype=np.int64).reshape(-1, 2))
     paused_s = paused_s[(paused_s[:, 0] < time_s[-1]) & (paused_s[:, 1] > time_s[0])]

@@ -15,7 +15,8 @@ class GnssSettings:
     """
 
     gap_steps: float = number(3.0, 1.5, 100.0)  # a step of time longer than so many usual ones is a gap; chosen
-    gap_min_s: float = number(0.5, 0.0, 60.0)  # a shorter step of time never is a gap; chosen
+    gap_min_s: float = number(0.2, 0.0, 60.0)  # a shorter step of time never is a gap; as the ledger's
+    loss_min_s: float = number(0.5, 0.0, 60.0)  # a shorter time without a fix is no loss; chosen
     # Share of the time without a fix after the first one that is worth a warning; chosen.
     lost_share_warn: float = number(0.02, 0.0, 1.0)
     # Share of the time without a fix after the first one that is bad; chosen.

@@ -1,5 +1,6 @@
 """Spells of the states of a receiver, shares of its time in them, and losses of the fix."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ from groundstation.systems.gnss.settings import GnssSettings
 LEAST_CLAIMS = 10  # rows with a claimed sigma that make its median
 NO_RECORD, LOG_SILENT = "no_record", "log_silent"
 MS = 1e-3  # s: pauses are known to it
+MISSES = 1.5  # usual steps of a sensor: in a longer one a row is missing
 
 
 @dataclass(frozen=True)
@@ -36,21 +38,20 @@ class Spells:
         return self.end_s - self.start_s
 
 
-def spells_of(one: ReceiverRows, others_s: FloatArray | None) -> Spells:
+def spells_of(one: ReceiverRows, others_s: Sequence[FloatArray]) -> Spells:
     """Return the spells of a receiver, gaps among them.
 
-    ``others_s`` are the times of all rows of other sensors, sorted; a gap in which none of them has a row is one of the
-    log. None where the log has no other sensor. A pause of the log is none of the receiver; what it misses before and
-    behind is a gap where it is long enough.
+    ``others_s`` are the times of the rows of each other sensor, sorted. A gap is one of the log where all of them miss
+    rows in it together, but for as long as a step of the receiver may be. A pause of the log is none of the receiver;
+    what it misses before and behind is a gap where it is long enough.
     """
     gap = np.flatnonzero(one.is_gap)
     row, start_s, end_s, is_pause = _parts_of(one, gap)
     silent = np.where(is_pause, NOT_LOGGED, NO_RECORD).astype(one.state.dtype)
-    if others_s is not None:
-        middle = 0.1 * (end_s - start_s)
-        first = np.searchsorted(others_s, start_s + middle)
-        behind = np.searchsorted(others_s, end_s - middle)
-        silent[(first == behind) & ~is_pause] = LOG_SILENT
+    if others_s:
+        free = [_free(time_s) for time_s in others_s]
+        shared = np.array([_shared_s(start, end, free) for start, end in zip(start_s, end_s, strict=True)])
+        silent[(end_s - start_s - shared <= one.gap_s) & ~is_pause] = LOG_SILENT
     # A gap begins when its row has held for its time; behind a pause it begins at once.
     held_s = np.where(start_s == one.time_s[row], one.held_s[row], 0.0)
     state = np.insert(one.state, row + 1, silent)
@@ -58,6 +59,28 @@ def spells_of(one: ReceiverRows, others_s: FloatArray | None) -> Spells:
     first = np.flatnonzero(np.append(True, state[1:] != state[:-1]))
     end = np.append(start[first[1:]], one.time_s[-1] + one.held_s[-1])
     return Spells(start[first], end, state[first])
+
+
+def _free(time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the times in which a sensor misses rows, from and to.
+
+    It does before its first row and behind its last.
+    """
+    steps = np.diff(time_s)
+    long = np.flatnonzero(steps > MISSES * float(np.median(steps))) if len(steps) else np.zeros(0, dtype=np.intp)
+    start = np.concatenate(([-np.inf], time_s[long], time_s[-1:]))
+    return start, np.concatenate((time_s[:1], time_s[long + 1], [np.inf]))
+
+
+def _shared_s(start_s: float, end_s: float, free: Sequence[tuple[FloatArray, FloatArray]]) -> float:
+    """Return how long in a gap all other sensors miss rows."""
+    spans = [(start_s, end_s)]
+    for start, end in free:
+        first, behind = int(np.searchsorted(end, start_s, "right")), int(np.searchsorted(start, end_s, "left"))
+        mine = list(zip(start[first:behind].tolist(), end[first:behind].tolist(), strict=True))
+        cut = [(max(a, c), min(b, d)) for a, b in spans for c, d in mine]
+        spans = [(a, b) for a, b in cut if b > a]
+    return sum(b - a for a, b in spans)
 
 
 def _parts_of(
@@ -110,7 +133,7 @@ def states_of(one: ReceiverRows, spells: Spells) -> tuple[FixState, ...]:
 def losses_of(one: ReceiverRows, spells: Spells, settings: GnssSettings) -> tuple[FixLoss, ...]:
     """Return stretches after the first fix without one, and gaps.
 
-    Single epochs without a fix are none.
+    Single epochs without a fix are none. A gap is from row to row, as the ledger counts it.
     """
     with_fix = np.flatnonzero(one.has_fix)
     if not with_fix.size:
@@ -121,7 +144,12 @@ def losses_of(one: ReceiverRows, spells: Spells, settings: GnssSettings) -> tupl
         edges = np.diff(np.concatenate([[0], without.astype(np.int8), [0]]))
         for first, behind in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
             start_s, end_s = float(spells.start_s[first]), float(spells.end_s[behind - 1])
-            if start_s <= one.time_s[with_fix[0]] or end_s - start_s <= settings.gap_min_s:
+            if kinds is WITHOUT_RECORD:
+                row = max(int(np.searchsorted(one.time_s, start_s + MS)) - 1, 0)
+                start_s = float(one.time_s[row]) if start_s <= one.time_s[row] + one.held_s[row] + MS else start_s
+            elif end_s - start_s <= settings.loss_min_s:
+                continue
+            if end_s <= one.time_s[with_fix[0]]:
                 continue
             longest = first + int(np.argmax(spells.seconds[first:behind]))
             before, after = _around(one, with_fix, start_s, end_s)

@@ -1,6 +1,6 @@
 """Words for a receiver's reception: the sentence, lengths, shares, times."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
 from groundstation.base.words import counted, never_a_fix
@@ -62,7 +62,7 @@ def _lost(one: GnssReceiver) -> str:
         return ""
     lost = [loss.seconds for loss in one.losses if loss.state in WITHOUT_FIX]
     gaps = [loss.seconds for loss in one.losses if loss.state not in WITHOUT_FIX]
-    told = [_times("lost", lost), _times("nothing recorded", gaps)]
+    told = [_times("lost", lost), gaps_text(gaps)]
     if not lost and one.lost_s > 0.0:
         told[0] = f"lost for {seconds_text(one.lost_s)}"
     return listed(told) or listed(("fix never lost", missing_of(one) if one.missed_epochs else ""))
@@ -73,6 +73,19 @@ def missing_of(one: GnssReceiver) -> str:
     missed = one.missed_epochs or 0
     expected = one.rows - one.repeated_rows + missed
     return f"{missed} of {expected} epochs missing"
+
+
+def gaps_text(seconds: Sequence[float]) -> str:
+    """Return the gaps in words, as the ledger has them: each from row to row.
+
+    Examples
+    --------
+    >>> gaps_text([3.42]), gaps_text([0.6, 3.42, 1.0]), gaps_text([])
+    ('nothing recorded for 3.4 s', '3 gaps, 5 s together, the longest 3.4 s', '')
+    """
+    if len(seconds) < 2:
+        return "".join(f"nothing recorded for {seconds_text(one)}" for one in seconds)
+    return f"{len(seconds)} gaps, {seconds_text(sum(seconds))} together, the longest {seconds_text(max(seconds))}"
 
 
 def _times(what: str, seconds: list[float]) -> str:

@@ -64,7 +64,10 @@ class Evidence:
 
 
 def blank(check: str, source: str, time_ns: Int64Array, why: str) -> Evidence:
-    """Return evidence that a check's quantity is logged without a value, and why: ``VIBRATION is zero throughout``."""
+    """Return evidence of a quantity that is logged without a value, and why.
+
+    ``why`` is in words: ``VIBRATION is zero throughout``.
+    """
     return Evidence(check, "", "", source, "", time_ns, np.full(len(time_ns), np.nan), blank=why)
 
 

@@ -22,7 +22,7 @@ _NOT = re.compile(r"\bnot\b", re.I)
 
 
 def why_no_end(flight: "Flight", path: FlightPath, phases: "Phases") -> str:
-    """Return the reason in words: set down without rolling, a landing that nothing proves, or none.
+    """Return the reason: set down without rolling, a landing not proven, or none.
 
     Between proven flight and proven ground it may hover down for seconds; no approach to a runway ends there.
     """
@@ -40,7 +40,7 @@ def why_no_end(flight: "Flight", path: FlightPath, phases: "Phases") -> str:
 
 
 def _between(phases: "Phases") -> tuple[float, float] | None:
-    """Return the time between the last proven flight and the ground behind it; None without both."""
+    """Return from and to between the last proven flight and the ground behind it."""
     known = [one for one in phases.intervals if one.phase != "unknown"]
     found = [
         (before.end_s, after.start_s)
@@ -51,7 +51,7 @@ def _between(phases: "Phases") -> tuple[float, float] | None:
 
 
 def _said(flight: "Flight") -> str:
-    """Return the last event by which the autopilot says that it is down, and when; empty without one."""
+    """Return the last event that says that the aircraft is down, and when; or nothing."""
     if "event" not in flight or not flight["event"].has("name"):
         return ""
     table = flight["event"]

@@ -8,13 +8,15 @@ import pytest
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
 from groundstation.integrity.ledger import gaps_of
-from groundstation.systems.gnss.answer import VelocityAgainstPosition
+from groundstation.pipeline.api import open_flight
+from groundstation.systems.gnss.answer import GnssReception, VelocityAgainstPosition
 from groundstation.systems.gnss.arrays import GnssMissing
 from groundstation.systems.gnss.examine import shortfalls_of
 from groundstation.systems.gnss.settings import GnssSettings
 from groundstation.systems.gnss.wording_answer import meaning_of, memory_of, same_claims
 from groundstation.tables.phases import PhaseInterval, Phases
 from groundstation.tables.table import Flight, Table
+from tests.real_logs import real_log
 from tests.systems.gnss.made import (
     STANDS_S,
     STEP_S,
@@ -88,6 +90,42 @@ def test_a_loss_has_length_speeds_and_way() -> None:
     place, _velocity = motion(np.array([99.8, 112.0]))
     assert loss.moved_m == pytest.approx(float(np.hypot(*(place[1] - place[0]))), rel=1e-4)
     assert one.lost_s == pytest.approx(12.0) and answer(table(time_s, fix=np.where(lost, "none", "3d"))).grade == "warn"
+
+
+def test_gaps_are_those_of_the_ledger_and_a_step_of_the_limit_is_none() -> None:
+    time_s = times()
+    exact, own = (time_s > 100.1) & (time_s < 100.5), (time_s > 120.1) & (time_s < 120.7)  # 3 steps, 4 steps
+    thinned = (time_s > 140.0) & (np.arange(len(time_s)) % 2 == 1)  # two usual steps each: no bursts
+    rows = table(time_s[~(exact | own | thinned)])
+    one, gaps = receiver(rows), gaps_of("gnss", rows.time_ns)
+    assert len(gaps) == 1 and gaps.length_s.tolist() == pytest.approx([0.8])
+    (loss,) = one.losses
+    assert (loss.start_s, loss.seconds) == pytest.approx((120.0, 0.8))  # from row to row
+
+
+def test_a_gap_that_others_share_but_for_a_row_late_is_the_logs() -> None:
+    time_s = times()
+    rows = table(time_s[(time_s < 100.0) | (time_s >= 103.0)])
+    slow_s = np.arange(0.0, WHOLE_S, 0.25)
+    slow_s = slow_s[(slow_s < 100.3) | (slow_s >= 102.9)]  # a row of it at 100.25 s, none until 103 s
+    baro = replace(table(slow_s, pressure_altitude_m=np.zeros(len(slow_s))), topic="baro")
+    one = receiver(rows, baro)
+    assert [loss.state for loss in one.losses] == ["log_silent"]
+    assert one.losses[0].seconds == pytest.approx(3.2)
+
+
+@pytest.mark.real_log
+def test_the_gaps_of_a_recorded_link_are_counted_once() -> None:
+    results = open_flight(real_log("tlog/uavlogviewer_vtol.tlog")).results
+    found = results.answer(GnssReception)
+    assert found is not None
+    entry, losses = results.ledger.topics["gnss"].gaps, found.receiver.losses
+    assert (entry.count, round(entry.total_s, 1)) == (10, 14.2)
+    assert len(losses) == 10 and sum(loss.seconds for loss in losses) == pytest.approx(entry.total_s, abs=0.01)
+    assert "10 gaps, 14 s together, the longest 3.4 s" in found.sentence
+    texts = [one.text for one in results.findings if one.topic == "gnss" and one.code in ("data.gaps", "gnss.silent")]
+    assert texts[0].startswith("gnss: 10 gaps, 14.2 s together, the longest 3.4 s")
+    assert all(" of 10 gaps" in text for text in texts[1:])
 
 
 def test_a_gap_of_the_log_is_not_the_receivers() -> None:
