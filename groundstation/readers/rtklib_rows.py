@@ -1,4 +1,4 @@
-"""Rows of an RTKLIB solution: records as the file has them, and as those of a GNSS receiver."""
+"""Rows of an RTKLIB solution: as the file has them, and as a GNSS receiver's."""
 
 import io
 import re
