@@ -25,6 +25,9 @@ from benchmarks.recorded import LOGS, are_here
 from groundstation.base.units import NS_PER_S
 
 IMPORTS = "bare imports of numpy and pyarrow"
+# What no conversion does without: of a table, and of any other log.
+NEEDED = "import numpy, typer, mcap.records, zstandard, lz4.frame, google.protobuf.descriptor_pb2"
+NEEDED_OF_TABLES = f"{NEEDED}, pyarrow.csv, pyarrow.compute"
 SMALL_GOAL, DATAFLASH_GOAL, ULOG_GOAL = Goal(2.5), Goal(3.2), Goal(1.3)
 SIZES_KB = (20, 2_000, 15_000)  # and 60_000 by --sizes-kb
 SMALL_BYTES, LARGE_BYTES = 100_000, 5_000_000
@@ -144,7 +147,12 @@ def measure(book: Book, what: str, log: Path, options: argparse.Namespace) -> No
     with tempfile.TemporaryDirectory() as folder:
         timed = commands(log, Path(folder), options.verbs, options.against, is_alone=options.no_peers)
         bare = Timed(IMPORTS, [sys.executable, "-c", "import numpy, pyarrow"], without_bytecode_switch())
-        timed.append(bare)
+        needed = Timed(
+            "limit: imports of other packages that convert needs",
+            [sys.executable, "-c", NEEDED_OF_TABLES if log.suffix == ".csv" else NEEDED],
+            without_bytecode_switch(),
+        )
+        timed += [bare, needed]
         if options.cold:
             for one in timed:
                 cold = Timed(f"{one.name}, cold", one.command, {**one.environment, "NUMBA_CACHE_DIR": f"{folder}/new"})

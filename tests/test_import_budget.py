@@ -22,6 +22,10 @@ NOT_NEEDED = (  # to look at a log, check or convert it
     *("groundstation.systems.system", "groundstation.tables.phases", "groundstation.reports", "groundstation.viewer"),
     *("groundstation.simulation", "groundstation.chapters.by_answer", "groundstation.pipeline.many_flights.runs.batch"),
 )
+OF_OTHER_LOGS = (  # a table of no profile is read, and its weather and earlier runs are not asked for
+    *("groundstation.readers.bags.bag", "groundstation.readers.profile", "groundstation.readers.rtklib_rows"),
+    *("groundstation.readers.receiver.host_text", "groundstation.results.manifest", "groundstation.base.metar"),
+)
 BY_VERB = """
 import os, sys
 from groundstation.cli.main import main
@@ -45,7 +49,12 @@ def loaded(program: str, *arguments: str, names: tuple[str, ...] = NOT_NEEDED) -
 @pytest.mark.parametrize("verb", ["info", "check", "convert"])
 def test_a_table_is_read_without_what_it_does_not_need(verb: str, tmp_path: Path) -> None:
     target = ["-o", str(tmp_path / "out.mcap")] if verb == "convert" else []
-    assert loaded(BY_VERB, verb, str(SAMPLE), *target) == []
+    assert loaded(BY_VERB, verb, str(SAMPLE), *target, names=(*NOT_NEEDED, *OF_OTHER_LOGS)) == []
+
+
+def test_what_applies_to_a_log_is_told_without_an_mcap_of_it() -> None:
+    CliRunner().invoke(app, ["list", str(SAMPLE)])  # compiles, where that was not done before
+    assert loaded(BY_VERB, "list", str(SAMPLE), names=("groundstation.store.writer",)) == []
 
 
 def test_a_purpose_is_answered_without_estimating() -> None:

@@ -62,7 +62,7 @@ def are_named(required: Sequence[str], lines: Sequence[HeadLine]) -> bool:
 
 @dataclass(frozen=True)
 class ProfileHead:
-    """Head of a shipped profile: what its files begin with, and names that a header row must have.
+    """Head of a shipped profile: first lines of its files, names of their header row.
 
     ``required`` is empty where files have no header row.
     """
@@ -86,7 +86,10 @@ def head_of(path: Path) -> ProfileHead:
 
 
 def _may_be_header(line: str, required: Sequence[str]) -> bool:
-    """Tell whether all names begin where a cell may: ``gnss.latitude_deg`` is no cell of the name behind its point."""
+    """Tell whether all names begin where a cell may.
+
+    ``gnss.latitude_deg`` is no cell of the name behind its point.
+    """
     is_quick = bool(required) and all(name in line for name in required)
     return is_quick and all(re.search(rf"(?<![\w.]){re.escape(name)}", line) for name in required)
 

@@ -1,6 +1,5 @@
 """Verb ``list``: the analyses, what each needs, and whether a log has it."""
 
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -68,23 +67,24 @@ def _of_a_session(folder: Path) -> list[dict[str, Any]]:
 
 def _with_answers(path: Path, profile: Path | None, icds: tuple[str, ...]) -> list[dict[str, Any]]:
     """Return the analyses, each with whether it would run on a log and why not."""
-    from groundstation.base.errors import UsageError
+    from groundstation.base.errors import UnreadableLogError, UsageError
     from groundstation.pipeline.one_flight.analyse import answers_of
     from groundstation.pipeline.one_flight.configuration import Configuration
-    from groundstation.pipeline.one_flight.convert import convert_log
-    from groundstation.pipeline.one_flight.flight import read_flight
+    from groundstation.pipeline.one_flight.convert import why_nothing_is_placed
     from groundstation.pipeline.one_flight.log import open_log
+    from groundstation.pipeline.verbs.check import checked_with_flight
 
     if not path.exists():
         raise UsageError(str(path), "no such file")
     path = file_in(path, ".mcap") if path.is_dir() else path
-    with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
-        mcap = Path(folder) / "flight.mcap"
-        converted = convert_log(open_log(path, profile, icds), mcap)
-        flight = read_flight(mcap, converted)
-    found, _known = answers_of(flight, Configuration())
+    configuration = Configuration()
+    checked, flight = checked_with_flight(open_log(path, profile, icds), configuration.thresholds, "none", with_flight=True)
+    if flight is None:
+        why = why_nothing_is_placed(checked.findings)
+        raise UnreadableLogError(path.name, why, "", "`info` shows what the file is")
+    found, _known = answers_of(flight, configuration)
     return [
-        *_unnamed(converted.info.ledger),
+        *_unnamed(checked.ledger),
         *(
             {**entry, "would_run": entry["name"] in found.answers, "reason": found.reasons.get(entry["name"], "")}
             for entry in _analyses()

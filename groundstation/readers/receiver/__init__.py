@@ -4,7 +4,6 @@ import re
 from collections.abc import Iterator
 
 from groundstation.base.records import Item
-from groundstation.readers.receiver import host_text
 from groundstation.readers.receiver.checksums import binary_frame_at, is_novatel_text, is_sentence
 from groundstation.readers.source import Claim, Source
 
@@ -38,6 +37,10 @@ def sniff(source: Source) -> Claim | None:
         found += 1
         if found == _ENOUGH:
             return Claim(NAME, confidence=0.7)
+    if b"$" not in head and b"!" not in head:  # what every sentence begins with
+        return None
+    from groundstation.readers.receiver import host_text
+
     return Claim(NAME, confidence=0.6) if host_text.find(head) else None
 
 
