@@ -1,4 +1,4 @@
-"""Several INS of a log that is too short to judge them: by how much they differ, and no verdict."""
+"""Differences of several INS in a log that is too short to judge them."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -20,7 +20,9 @@ SAME_M, SAME_DEG = 0.5, 0.005  # smaller differences round to nothing
 def differ_in_short(
     tracks: Sequence[UnitTrack], *, ins_class: str, ins_class_origin: str, least_s: float
 ) -> UnitsResult | None:
-    """Return the differences of units that are together for less than ``least_s``; None where none is known.
+    """Return the differences of units that are together for less than ``least_s``.
+
+    None where none is known.
 
     A difference is the median over the time of both, the second unit less the first, whose values are interpolated to
     the times of the one with fewer samples. Its interval is 1.96 times the scatter: what noise and rounding of both do,
