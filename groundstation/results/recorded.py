@@ -119,8 +119,8 @@ def _kind(ledger: Ledger, kind: str, told: str) -> tuple[str, str] | None:
         return None
     name = NAMES[kind] if kind != "ins" else _of_ins(topics.values())
     several = f"{len(topics)} x {name}" if len(topics) > 1 else name
-    rates = sorted(rate for one in topics.values() if (rate := _rate(one)))
-    ends = list(dict.fromkeys(_hertz(rate) for rate in (rates[:1] + rates[-1:])))
+    rates = sorted(one for topic in topics.values() if (one := _rate(topic)))
+    ends = list(dict.fromkeys(_hertz(one) for one in (rates[:1] + rates[-1:])))
     rate = f"at {' to '.join(ends)} Hz" if rates else counted(sum(one.rows for one in topics.values()), "row")
     return f"{several} ({told})" if told else several, rate
 

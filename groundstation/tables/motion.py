@@ -98,7 +98,7 @@ def motion_of(flight: Flight) -> Motion:
     speed = np.where(np.isfinite(speed), speed, on_grid(flight, fast, horizontal_speed_mps, size))
     true_heading, magnetic = ins.values("true_heading_deg"), ins.values("magnetic_heading_deg")
     heading = true_heading if np.isfinite(true_heading).any() else magnetic
-    placed = (first_of_kind(flight, kind, *PLACE) for kind in ("gnss", "ins"))
+    placed = first_of_kind(flight, "gnss", *PLACE), first_of_kind(flight, "ins", *PLACE)
     north, east = _positions(flight, *placed, size)
     moving = np.nan_to_num(speed, nan=0.0)
     return Motion(
