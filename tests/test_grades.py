@@ -21,7 +21,7 @@ PACKAGE = Path(groundstation.__file__).parent
 IN_TABLES = {  # words of cells, explained by the tables that they stand in
     *("Observable", "Not observable", "Not known", "No", "Yes", "Within", "Beyond"),
     *("It or another", "GNSS corrects it", "Repeats another", "Repeats "),  # of a unit
-    *("Not assessable", "Accepted", "NOT ACCEPTED", "Planned", "Planned, with warnings", "No usable plan"),
+    *("Not assessable", "NOT ACCEPTED", "Planned", "Planned, with warnings", "No usable plan"),
     *("Pass", "Fail", "Not enough flights", "Not flown", "No limit"),  # of an acceptance, by its own page
 }
 

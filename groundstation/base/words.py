@@ -56,7 +56,7 @@ def clock_text(seconds: float) -> str:
 
 
 def length_text(seconds: float) -> str:
-    """Return how long a log is: in milliseconds below ten seconds, as minutes and seconds beyond.
+    """Return the length of a log: to the millisecond below ten seconds, else as a clock.
 
     Examples
     --------

@@ -14,7 +14,7 @@ from groundstation.integrity.contradictions import Contradiction, contradictions
 from groundstation.integrity.inertial import InertialTally, is_inertial
 from groundstation.integrity.ledger import FieldCounts
 from groundstation.integrity.limits import Thresholds
-from groundstation.integrity.pauses import Arming, armings_in
+from groundstation.integrity.pauses import Arming, armings_in, says_no_log_while_disarmed
 from groundstation.integrity.sequence import Counter, Sequence, counters_of
 from groundstation.integrity.spans import RecorderDropout, Timeline
 from groundstation.integrity.stretches import Constancy, RecordPlace, Sampler
@@ -22,6 +22,7 @@ from groundstation.integrity.stuck import Judge, MotionSampler, StuckPlace, watc
 
 FloatArray = NDArray[np.float64]
 
+PARAMETERS, NAME_OF_ONE, VALUE_OF_ONE = "raw.PARM", "Name", "Value"  # of ArduPilot
 DROPOUTS, DROPOUT_LENGTH = "raw.ulog.dropouts", "duration_ms"
 MOST_DROPOUTS = MOST_ARMINGS = 10_000
 
@@ -115,6 +116,7 @@ class Contents:
         self._timeline = Sampler()
         self._dropouts: list[tuple[RecordPlace, float]] = []
         self._armings: list[tuple[RecordPlace, bool]] = []
+        self._is_silent_while_disarmed: bool | None = None
         self._judge: Judge | None = None
 
     def add(self, batch: RecordBatch, device_ns: Int64Array | None = None) -> None:
@@ -144,6 +146,9 @@ class Contents:
         self._sample(batch, device_ns)
         if kind_of(batch.topic) == "event" and "name" in batch.columns:
             self._add_armings(batch.columns["name"], batch.record_index, device_ns)
+        if batch.topic == PARAMETERS and {NAME_OF_ONE, VALUE_OF_ONE} <= batch.columns.keys():
+            told = says_no_log_while_disarmed(batch.columns[NAME_OF_ONE], batch.columns[VALUE_OF_ONE])
+            self._is_silent_while_disarmed = self._is_silent_while_disarmed if told is None else told
         if batch.topic == DROPOUTS and DROPOUT_LENGTH in batch.columns:
             self._add_dropouts(batch.columns[DROPOUT_LENGTH], batch.record_index, device_ns)
 
@@ -176,6 +181,11 @@ class Contents:
     def armings(self, clock: ClockModel) -> tuple[Arming, ...]:
         """Changes between armed and disarmed that the events tell."""
         return tuple(Arming(place.time_ns(clock), is_armed) for place, is_armed in self._armings)
+
+    @property
+    def is_silent_while_disarmed(self) -> bool:
+        """Truth of a setting in the log that says that nothing is logged while disarmed."""
+        return bool(self._is_silent_while_disarmed)
 
     def fields(self, topic: str, clock: ClockModel) -> tuple[FieldCounts, ...]:
         """Ledgers of a topic's fields."""

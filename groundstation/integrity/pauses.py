@@ -3,7 +3,8 @@
 A silence is time in which no topic with a rhythm has a record though one is due. It is of the log, and not of its
 topics, when every canonical topic with a rate misses records in it and most of them stop and go on with it, each to
 within the longest step that is no gap of it. It is a pause as far as the vehicle was disarmed, when recording goes on
-as it is armed: so does an autopilot that does not log while disarmed. What is left of it is a stop.
+as it is armed: so does an autopilot that does not log while disarmed. Where its own setting says that it does not, it
+is a pause also when recording goes on without an arm: a failed arming is logged too. What is left of it is a stop.
 """
 
 from collections.abc import Iterable, Sequence
@@ -20,6 +21,8 @@ from groundstation.integrity.rhythm import Rhythm
 
 TRUTH = "truth"  # may come from another log, which does not pause with this one
 ARMED, DISARMED = "armed", "disarmed"
+LOG_DISARMED = "LOG_DISARMED"  # parameter of ArduPilot: 0 logs nothing while disarmed
+NEVER_NS = int(np.iinfo(np.int64).max)
 LEAST_TOPICS = 2  # canonical ones that are silent together: the gap of a single one is its own
 MISSES = 1.5  # periods: in a longer step a record is missing
 
@@ -68,8 +71,18 @@ def outline_of(topic: str, time_ns: Int64Array, rhythm: Rhythm, limits: GapLimit
     return Outline(topic, int(time_ns[0]), int(time_ns[-1]), start_ns, end_ns, *judged)
 
 
-def pauses_of(outlines: Sequence[Outline], armings: Iterable[Arming], limits: GapLimits) -> tuple[Pause, ...]:
+def says_no_log_while_disarmed(name: Column, value: Column) -> bool | None:
+    """Tell whether rows of parameters say so, the last of them; None where none does."""
+    rows = np.flatnonzero((np.asarray(name.values, dtype=np.str_) == LOG_DISARMED) & name.mask & value.mask)
+    return float(value.values[rows[-1]]) == 0.0 if len(rows) else None
+
+
+def pauses_of(
+    outlines: Sequence[Outline], armings: Iterable[Arming], limits: GapLimits, *, is_by_setting: bool = False
+) -> tuple[Pause, ...]:
     """Return the silences of the log while the vehicle was disarmed, in order of time.
+
+    ``is_by_setting``: a setting in the log says that nothing is logged while disarmed.
 
     Examples
     --------
@@ -85,7 +98,7 @@ def pauses_of(outlines: Sequence[Outline], armings: Iterable[Arming], limits: Ga
     found = []
     for start_ns, end_ns, slack_ns in _silences(outlines, limits):
         for disarmed_ns, armed_ns in times:
-            if abs(armed_ns - end_ns) <= slack_ns:
+            if abs(armed_ns - end_ns) <= slack_ns or (is_by_setting and disarmed_ns < end_ns < armed_ns):
                 pause = Pause(max(start_ns, disarmed_ns), min(end_ns, armed_ns))
                 found += [pause] if pause.end_ns - pause.start_ns > limits.min_ns else []
     return tuple(dict.fromkeys(found))
@@ -100,7 +113,7 @@ def stops_of(outlines: Sequence[Outline], limits: GapLimits) -> tuple[Pause, ...
 
 
 def _disarmed(armings: Iterable[Arming]) -> list[tuple[int, int]]:
-    """Return the times from a disarm to the next arm."""
+    """Return the times from a disarm to the next arm, the last perhaps without end."""
     times, since_ns = [], None
     for one in sorted(armings):
         if not one.is_armed:
@@ -108,7 +121,7 @@ def _disarmed(armings: Iterable[Arming]) -> list[tuple[int, int]]:
         elif since_ns is not None:
             times.append((since_ns, one.time_ns))
             since_ns = None
-    return times
+    return times if since_ns is None else [*times, (since_ns, NEVER_NS)]
 
 
 def _silences(outlines: Sequence[Outline], limits: GapLimits) -> list[tuple[int, int, float]]:

@@ -204,7 +204,8 @@ def _counted(
     Where it has pauses the topics are counted again, by a rhythm that knows them.
     """
     found = _count(times(), contents, clock, limits)
-    pauses = pauses_of(found.outlines, contents.armings(clock), limits.gaps)
+    armings, is_by_setting = contents.armings(clock), contents.is_silent_while_disarmed
+    pauses = pauses_of(found.outlines, armings, limits.gaps, is_by_setting=is_by_setting)
     if pauses:
         found = _count(times(), contents, clock, limits, pauses)
     return found, _Silences(pauses, stops_of(found.outlines, limits.gaps))

@@ -186,14 +186,14 @@ def _present(topic: TopicEntry) -> tuple[str, ...]:
 
 
 def unnamed_buses(ledger: Ledger) -> int:
-    """Return the number of bus channels with words that no ICD names as signals; 0 where the log has signals."""
+    """Return the number of bus channels whose words no ICD names; 0 of a log with signals."""
     if any(is_canonical(name) and _present(one) for name, one in ledger.topics.items()):
         return 0
     return sum(name.startswith(BUS_PREFIX) and one.rows > 0 for name, one in ledger.topics.items())
 
 
 def _raw(results: FlightResults) -> str:
-    """Return the messages of a log without signals, those with most rows first; of buses, how to name them."""
+    """Return the messages of a log without signals; of buses, what names them."""
     length = f"{_of_log(results.duration_s)} of " if results.duration_s else ""
     if count := unnamed_buses(results.ledger):
         return f"{length}words of {counted(count, 'bus channel')} without ICD: {HOW_TO_NAME}"

@@ -89,7 +89,7 @@ def _fleet(recorder: FleetRecorder, fleet: FleetResults, found: list[Logged]) ->
     judged = [one for one in aircraft if is_judged(fleet, one)]
     errors = by_aircraft([one for one, views in found if HEADING in views], HEADING)
     plots = [*errors, *([verdicts(judged)] if judged else [])]
-    answer = heading_error_density(recorder, fleet)
+    answer = heading_error_density(recorder, fleet, aircraft)
     if text:
         recorder.document("by_aircraft", text)
         answer = [document("By aircraft", "by_aircraft"), *answer]

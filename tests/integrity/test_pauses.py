@@ -131,6 +131,33 @@ def test_a_silence_that_arming_does_not_explain_stays_a_warning(events: list[tup
     assert ledger.pauses == () and told(ledger) == [("data.silent", "warn", "")]
 
 
+def with_setting(items: list[Item], value: float) -> list[Item]:
+    """Add the parameter that says whether the autopilot logs while disarmed."""
+    index = np.array([sum(len(one) for one in items if isinstance(one, RecordBatch))], dtype=np.int64)
+    columns = {"Name": Column(np.array(["LOG_DISARMED"])), "Value": Column(np.array([value]))}
+    return [*items, batch_of("raw.PARM", [99.9], index, **columns)]
+
+
+@pytest.mark.parametrize(
+    ("events", "value", "pauses"),
+    [
+        ([DISARMED], 0.0, [(40.08, 70.1)]),  # it resumed as an arming failed, and was never armed again
+        ([DISARMED, (90.0, "armed")], 0.0, [(40.08, 70.1)]),  # the second try succeeded
+        ([DISARMED], 1.0, []),  # it logs while disarmed: something stopped it
+        ([], 0.0, []),  # nothing says that it was disarmed
+        ([(75.0, "disarmed")], 0.0, []),  # it was disarmed later
+        ([DISARMED, (60.0, "armed")], 0.0, []),  # armed within the silence
+    ],
+)
+def test_a_silence_while_disarmed_is_a_pause_where_the_setting_says_so(
+    events: list[tuple[float, str]], value: float, pauses: list[tuple[float, float]]
+) -> None:
+    """A log that resumed after a failed arming was told as silent without a reason."""
+    ledger = found_in(with_setting(log_of(events), value))
+    assert seconds(ledger.pauses) == pauses
+    assert told(ledger) == [("data.not_logged", "info", "") if pauses else ("data.silent", "warn", "")]
+
+
 def test_a_log_that_stops_before_the_disarm_has_a_stop_and_a_pause() -> None:
     ledger = found_in(log_of([DISARMED, ARMED], holes=[(30.0, 70.1)]))
     assert seconds(ledger.pauses) == [(40.0, 70.0)] and seconds(ledger.stops) == [(29.98, 40.0)]

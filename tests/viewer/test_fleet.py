@@ -20,7 +20,7 @@ from groundstation.systems.cooperative.fleet_chapter import build as sessions
 from groundstation.systems.heading import fleet_chapter as aircraft
 from groundstation.systems.inertial import fleet_chapter as forecast
 from groundstation.viewer.file_contents import facts_of_file
-from groundstation.viewer.fleet_density import MOST_STEPS, PATH, steps
+from groundstation.viewer.fleet_density import MOST_STEPS, PATH, SO_FAR, steps
 from tests.fleet_example import save_flight, skill
 from tests.recording_contents import Contents
 from tests.told import write_fleet_recording
@@ -145,21 +145,37 @@ def test_an_aircraft_without_changes_has_none(contents: Contents) -> None:
     assert values.shape == (2, 3)
 
 
-def test_the_growing_density_is_that_of_all_flights_so_far(contents: Contents, fleet: FleetResults) -> None:
+def test_each_aircraft_has_a_row_with_the_density_of_its_flights_so_far(
+    contents: Contents, fleet: FleetResults
+) -> None:
+    """Errors of different aircraft were pooled in one chart, as the page never does."""
+    densities, numbers = fleet.densities, fleet.flights["flight_id"].tolist()
+    assert not any(entity.startswith(f"/{PATH}/{SO_FAR}") for entity in contents.batches)
+    rows = [entity for entity in contents.batches if entity.startswith(f"/{PATH}/") and entity.endswith(SO_FAR)]
+    assert len(rows) == len(densities.named) == 3
+    seen = set()
+    for entity in rows:
+        so_far_of = {
+            place: np.asarray(tensor[0]["buffer"])
+            for batch in contents.batches[entity]
+            for place, tensor in zip(
+                batch.column("flight_number").to_pylist(), batch.column("BarChart:values").to_pylist(), strict=True
+            )
+        }
+        (name,) = {str(densities.aircraft[densities.flight_id == numbers[place - 1]][0]) for place in so_far_of}
+        seen.add(name)
+        own = densities.aircraft == name
+        assert len(so_far_of) == int(own.sum())
+        last = so_far_of[max(so_far_of)]
+        assert np.allclose(last, densities.pooled_of(name), rtol=1e-6, atol=1e-9)
+    assert seen == set(densities.named)
+
+
+def test_the_growing_density_is_that_of_all_flights_so_far(fleet: FleetResults) -> None:
     densities = fleet.densities
-    so_far_of = {
-        place: np.asarray(tensor[0]["buffer"])
-        for batch in contents.batches[f"/{PATH}/fleet_so_far"]
-        for place, tensor in zip(
-            batch.column("flight_number").to_pylist(), batch.column("BarChart:values").to_pylist(), strict=True
-        )
-    }
-    assert sorted(so_far_of) == list(range(1, FLIGHTS + 1))
     for upto, (place, so_far) in enumerate(steps_of(densities), start=1):
         expected = np.average(densities.density_per_deg[:upto], axis=0, weights=densities.samples[:upto])
         assert place == upto - 1 and np.allclose(so_far, expected, rtol=1e-6)
-        assert (so_far_of[upto] == so_far).all() or not so_far_of[upto].any(), "left out only when far too high"
-    assert np.allclose(so_far_of[FLIGHTS], densities.pooled_per_deg, rtol=1e-6, atol=1e-9)
 
 
 def steps_of(densities: Densities) -> list[tuple[int, np.ndarray]]:

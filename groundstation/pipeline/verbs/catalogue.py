@@ -78,7 +78,9 @@ def _with_answers(path: Path, profile: Path | None, icds: tuple[str, ...]) -> li
         raise UsageError(str(path), "no such file")
     path = file_in(path, ".mcap") if path.is_dir() else path
     configuration = Configuration()
-    checked, flight = checked_with_flight(open_log(path, profile, icds), configuration.thresholds, "none", with_flight=True)
+    checked, flight = checked_with_flight(
+        open_log(path, profile, icds), configuration.thresholds, "none", with_flight=True
+    )
     if flight is None:
         why = why_nothing_is_placed(checked.findings)
         raise UnreadableLogError(path.name, why, "", "`info` shows what the file is")

@@ -1,4 +1,4 @@
-"""Several INS of a log that is too short to judge them: by how much they differ, and no verdict."""
+"""Differences of several INS in a log that is too short to judge them."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -20,7 +20,9 @@ SAME_M, SAME_DEG = 0.5, 0.005  # smaller differences round to nothing
 def differ_in_short(
     tracks: Sequence[UnitTrack], *, ins_class: str, ins_class_origin: str, least_s: float
 ) -> UnitsResult | None:
-    """Return the differences of units that are together for less than ``least_s``; None where none is known.
+    """Return the differences of units that are together for less than ``least_s``.
+
+    None where none is known.
 
     A difference is the median over the time of both, the second unit less the first, whose values are interpolated to
     the times of the one with fewer samples. Its interval is 1.96 times the scatter: what noise and rounding of both do,
@@ -99,16 +101,18 @@ def _heading_deg(first: UnitTrack, second: UnitTrack, time_s: FloatArray) -> Mea
 
 
 def _distance_m(first: UnitTrack, second: UnitTrack, time_s: FloatArray) -> Measured | None:
-    places = [
-        _at(one, values, time_s)
-        for one in (first, second)
-        for values in (one.latitude_deg, continuous_longitude_deg(one.longitude_deg))
-    ]
-    if any(one is None for one in places):
-        return None
-    latitude_1, longitude_1, latitude_2, longitude_2 = (np.asarray(one) for one in places)
-    north, east = north_east_m(latitude_1, longitude_1, latitude_2, longitude_2)
-    return _measured(np.hypot(north, east))
+    places = []
+    for one in (first, second):
+        latitude = _at(one, one.latitude_deg, time_s)
+        longitude = _at(one, continuous_longitude_deg(one.longitude_deg), time_s)
+        if latitude is None or longitude is None or not np.isfinite(latitude).any():
+            return None
+        places.append((latitude, longitude))
+    (latitude_1, longitude_1), (latitude_2, longitude_2) = places
+    origin = float(np.nanmedian(latitude_1)), float(np.nanmedian(longitude_1))
+    north_1, east_1 = north_east_m(latitude_1, longitude_1, *origin)
+    north_2, east_2 = north_east_m(latitude_2, longitude_2, *origin)
+    return _measured(np.hypot(north_2 - north_1, east_2 - east_1))
 
 
 def _unit(track: UnitTrack, ins_class: str) -> InsUnit:

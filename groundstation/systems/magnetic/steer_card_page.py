@@ -91,7 +91,7 @@ def _state(answer: MagneticResult | FluxDeviation) -> tuple[Mark, str]:
     """Return the verdict; any but accept is printed large."""
     reason = _shorter(typeset(answer.verdict_reason), MOST_OF_A_REASON)
     if answer.verdict == "accept":
-        return Mark("good", "Accepted"), reason
+        return Mark("good", "Accept"), reason
     return Mark("bad", "NOT ACCEPTED"), reason if answer.verdict == "reject" else f"{answer.verdict}: {reason}"
 
 

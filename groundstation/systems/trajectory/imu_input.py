@@ -31,6 +31,37 @@ class ImuInput:
     notes: tuple[InputNote, ...]
 
 
+def _gap_notes(
+    flight: Flight, topic: str, imu: ImuIncrements, gaps_s: FloatArray, settings: InputSettings
+) -> list[InputNote]:
+    """Return notes on the gaps of a unit, and on those that are pauses of the whole log.
+
+    A gap is a pause as far as nothing was logged; what is left of it is a gap where it is longer than one may be.
+    """
+    if not gaps_s.size:
+        return []
+    steps_s = np.diff(imu.time_s) - imu.interval_s[1:]
+    rows = np.sort(np.argsort(steps_s)[::-1][: gaps_s.size])
+    start_s, end_s = imu.time_s[rows], imu.time_s[rows + 1] - imu.interval_s[rows + 1]
+    paused_s = np.zeros(rows.size)
+    for one in flight.pauses:
+        first_s, last_s = flight.seconds(np.array(one, dtype=np.int64))
+        paused_s += np.maximum(np.minimum(end_s, last_s) - np.maximum(start_s, first_s), 0.0)
+    is_pause = paused_s > 0.0
+    left_s = np.where(is_pause, (end_s - start_s) - paused_s, end_s - start_s)
+    left_s = left_s[~is_pause | (left_s > settings.gap_s)]
+    notes = []
+    if is_pause.any():
+        text = f"{counted(is_pause.sum(), 'pause')} of the log while disarmed, {paused_s.sum():.1f} s in all"
+        notes.append(InputNote("pauses", text, int(is_pause.sum())))
+    if left_s.size:
+        text = (
+            f"{counted(left_s.size, 'gap')} of {topic}, {left_s.sum():.1f} s in all, the longest {left_s.max():.2f} s"
+        )
+        notes.append(InputNote("gaps", text, int(left_s.size)))
+    return notes
+
+
 def imu_of(flight: Flight, settings: InputSettings) -> ImuInput:
     """Return the increments of the best inertial unit of a flight.
 
@@ -60,11 +91,7 @@ def imu_of(flight: Flight, settings: InputSettings) -> ImuInput:
     if bridged.missing_s > least_s:
         text = f"samples of {topic} are missing in steps below {settings.gap_s:g} s, {bridged.missing_s:.1f} s in all"
         notes.append(InputNote("bridged", f"{text}: bridged"))
-    if gaps_s.size:
-        text = (
-            f"{counted(gaps_s.size, 'gap')} of {topic}, {gaps_s.sum():.1f} s in all, the longest {gaps_s.max():.2f} s"
-        )
-        notes.append(InputNote("gaps", text, int(gaps_s.size)))
+    notes += _gap_notes(flight, topic, imu, gaps_s, settings)
     rate_hz = 1.0 / float(np.median(imu.interval_s))
     facts = ImuFacts(
         topic,

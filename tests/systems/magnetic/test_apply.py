@@ -532,7 +532,7 @@ def test_the_card_shows_every_row(first: Path) -> None:
             f"{row['magnetic_heading_deg']:03.0f} {round(row['steer_deg']) % 360:03d} {added} ± {row['sigma_deg']:.1f}"
         )
         assert line in text, line
-    for shown in ("SIM-3", summary["flight"]["start_utc"][:10], "✓ Accepted", "iron fit", ADVISORY):
+    for shown in ("SIM-3", summary["flight"]["start_utc"][:10], "✓ Accept", "iron fit", ADVISORY):
         assert shown in text.replace("\u00a0", " ")
     assert f"{magnetic['residual_rms_deg']['after']:.2f}° after" in text
 
@@ -542,7 +542,7 @@ def test_the_card_shows_every_row(first: Path) -> None:
 )
 def test_a_card_that_is_not_accepted_says_so(tmp_path: Path, verdict: str, shown: str) -> None:
     text = printed(tmp_path, verdict=verdict, verdict_reason="Coverage: 0.9, at least 0.98")
-    assert shown in text and "Accepted" not in text
+    assert shown in text and "Accept" not in text
 
 
 @pytest.mark.parametrize("step_deg", [180, 90, 45, 30, 20, 15, 10, 7, 1])

@@ -9,6 +9,7 @@ import pytest
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.errors import NotAssessableError
+from groundstation.base.gaps import Pause
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.known import Interval, Known
@@ -265,6 +266,24 @@ def test_a_gap_stays_a_gap() -> None:
             assert found.imu.interval_s.max() == pytest.approx(STEP_S, rel=1e-3)
             assert (found.imu_facts.gaps, codes(found)["gaps"]) == (1, 1)
             assert found.imu_facts.longest_gap_s == pytest.approx(length_s, abs=2 * STEP_S)
+
+
+def test_a_pause_of_the_log_while_disarmed_is_no_gap_of_the_unit() -> None:
+    """A log with one pause of 21.2 s was told as "1 gap of imu, 21.2 s in all"."""
+    time_s = imu_times()
+    keep = (time_s <= 20.0) | (time_s > 41.2)
+    pause = Pause(round(20.0 * NS_PER_S), round(41.2 * NS_PER_S))
+    made = {one.topic: one for one in (increments(time_s).take(keep & ((time_s < 50.0) | (time_s > 53.0))), fixes())}
+
+    def notes_of(*pauses: Pause) -> dict[str, str]:
+        flight = Flight(made, start_ns=0, pauses=pauses)
+        return {note.code: note.text for note in gather(flight, Known(Phases((), "none")), InputSettings()).notes}
+
+    assert notes_of(pause)["pauses"] == "1 pause of the log while disarmed, 21.2 s in all"
+    assert notes_of(pause)["gaps"].startswith("1 gap of imu, 3.0 s in all")
+    assert "pauses" not in notes_of() and notes_of()["gaps"].startswith("2 gaps of imu, 24.2 s in all")
+    early = Pause(round(30.0 * NS_PER_S), pause.end_ns)  # the log stopped 10 s before the pause
+    assert notes_of(early)["gaps"].startswith("2 gaps of imu, 13.0 s in all")
 
 
 def test_increments_of_a_part_of_the_time_are_samples() -> None:
