@@ -103,7 +103,7 @@ def test_info_shows_logs_of_one_flight_as_one(kit: Path) -> None:
     assert shown["facts"]["size"] == f"{size} bytes"
     code, out, told = groundstation("info", *logs, "--profile", str(kit / "my.toml"))
     assert code == 0 and len(out.splitlines()) == 2 and "2 logs" in told
-    assert groundstation("info", logs[0], "--together")[0] == 2
+    assert groundstation("info", logs[1], "--together")[0] == 2
 
 
 def test_an_empty_file_of_a_folder_is_told_as_empty(kit: Path) -> None:
