@@ -101,6 +101,7 @@ MAY_BE_SHORT = {  # beside __init__.py
     "results/file_names.py": "tells results from logs without loading either",
     "results/forecast_methods.py": "words of the forecast for rooms that name no system",
     "store/marks.py": "every other log is opened without the store",
+    "systems/gnss/advice_chapter.py": "advice of a system: who looks for it looks there",
     "systems/heading/installation/answer.py": "an answer: who looks for one looks there",
     "systems/latency/arrays.py": "arrays of a system: who looks for them looks there",
     "systems/several_logs/arrays.py": "the same",

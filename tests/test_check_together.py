@@ -93,6 +93,25 @@ def test_where_nothing_gives_a_clock_the_file_and_the_setting_that_would_are_nam
     assert "no UTC in imu.csv and gnss.csv" in told and "gnss.csv gets UTC by a line `# start_utc: ...` on top" in told
 
 
+def test_info_shows_logs_of_one_flight_as_one(kit: Path) -> None:
+    logs = str(kit / "imu.csv"), str(kit / "gnss.csv")
+    code, out, _told = groundstation("info", *logs, "--profile", str(kit / "my.toml"), "--together", "--json")
+    shown = json.loads(out)
+    assert code == 0 and {one["name"] for one in shown["topics"]} >= {"imu", "gnss.b"}
+    assert "imu.csv" in shown["facts"]["file"] and "gnss.csv" in shown["facts"]["file"]
+    size = sum((kit / name).stat().st_size for name in ("imu.csv", "gnss.csv"))
+    assert shown["facts"]["size"] == f"{size} bytes"
+    code, out, told = groundstation("info", *logs, "--profile", str(kit / "my.toml"))
+    assert code == 0 and len(out.splitlines()) == 2 and "2 logs" in told
+    assert groundstation("info", logs[1], "--together")[0] == 2
+
+
+def test_an_empty_file_of_a_folder_is_told_as_empty(kit: Path) -> None:
+    (kit / "nothing.csv").write_bytes(b"")
+    code, _out, told = groundstation("check", str(kit), "--profile", str(kit / "my.toml"))
+    assert code == 0 and "1 other file that no reader claims; 1 empty file" in told
+
+
 def test_a_folder_is_a_line_for_each_log(kit: Path) -> None:
     profile = ("--profile", str(kit / "my.toml"))
     code, out, told = groundstation("check", str(kit), *profile)

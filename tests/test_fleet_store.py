@@ -10,6 +10,7 @@ import sys
 import tracemalloc
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.fleet import FleetResults
 from groundstation.systems.heading.answer import OnboardComparison, RunwayCheck
+from groundstation.systems.inertial.columns import FORECAST_COLUMNS
 from tests.fleet_example import START_NS, save_flight, skill
 
 REPOSITORY = Path(__file__).parents[1]
@@ -67,6 +69,16 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+def test_the_forecast_stands_beside_the_raw_ins() -> None:
+    made = skill(rms_m=100.0)
+    rows = tuple(replace(one, p95_m=900.0 if one.method == "raw_ins" else one.p95_m) for one in made.skill)
+    told = {column.name: column.value(replace(made, skill=rows)) for column in FORECAST_COLUMNS}
+    assert told["forecast_60min_p95_m"] == 200.0 and told["raw_60min_p95_m"] == 900.0
+    assert {column.name: column.value(replace(made, skill=())) for column in FORECAST_COLUMNS}[
+        "raw_60min_p95_m"
+    ] is None
+
+
 def test_flights_are_typed_with_units_and_meanings(fleet: Path) -> None:
     found = pq.read_table(fleet / FLEET_PARQUET)
     kinds = {
@@ -87,6 +99,7 @@ def test_flights_are_typed_with_units_and_meanings(fleet: Path) -> None:
     assert row["aircraft"] == "A12" and row["month"] == "2026-05" and row["error_deg"] == 0.1
     assert row["start_utc"].isoformat() == "2026-05-08T06:00:00+00:00"
     assert row["samples"] == 360 and row["has_lost_data"] is False and row["forecast_60min_rms_m"] == 202.0
+    assert row["forecast_60min_p95_m"] == row["raw_60min_p95_m"] == 202.0, "of both methods in the example"
     last = found.slice(12, 1).to_pylist()[0]
     assert last["aircraft"] is None and last["onboard_error_deg"] is None and last["forecast_method"] is None
 

@@ -4,7 +4,7 @@ Track map, altitude, speed, attitude, phases and the state of GNSS.
 """
 
 from groundstation.chapters.parts import Figure, Section
-from groundstation.chapters.wording import clean, percent
+from groundstation.chapters.wording import clean
 from groundstation.results.arrays.flight import Overview, PhaseSpans, StateLanes
 from groundstation.results.flight import KIND_OF_VEHICLE, PHASES_BY, WHY_THAT_VEHICLE, FlightResults
 
@@ -36,4 +36,4 @@ def _vehicle(results: FlightResults) -> str:
     method = clean(results.metadata.get(PHASES_BY, ""))
     why_not = method.removeprefix(NOTHING_PROVEN)
     rest = f"nothing proves them: {why_not}" if why_not != method else f"the others are proven ({method})"
-    return f"{told} Phases of {percent(share)} of the time are likely by speed and height; {rest}."
+    return f"{told} Phases of {100.0 * share:.0f} % of the time are likely by speed and height; {rest}."

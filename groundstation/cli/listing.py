@@ -74,4 +74,4 @@ def _tell(name: str, text: str) -> None:
 
 
 def _others(named: "NamedLogs") -> str:
-    return f"; {counted(named.others, 'other file')} that no reader claims" if named.others else ""
+    return f"; {named.passed_over}" if named.others else ""

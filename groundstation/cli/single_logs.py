@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from groundstation.base.errors import UsageError
+from groundstation.base.words import counted
 from groundstation.cli.application import (
     DATA_LOST,
     DONE,
@@ -43,10 +44,12 @@ from groundstation.cli.completion import analyses
 @app.command(epilog=examples("info"))
 @answers_with_exit_code
 def info(
-    log: Annotated[
-        Path,
+    logs: Annotated[
+        list[Path],
         typer.Argument(
-            help="A recorded log, an MCAP, or a folder of logs: a line each.", metavar="LOG", readable=False
+            help="A recorded log, or an MCAP. Of several, and of a folder, each log is told in a line.",
+            metavar="LOG",
+            readable=False,
         ),
     ],
     profile: Profile = None,
@@ -54,23 +57,29 @@ def info(
     suggest_icd: Annotated[
         bool, typer.Option("--suggest-icd", help="Print a draft ICD for what is on its buses.")
     ] = False,
+    together: Together = False,
     timeout: Timeout = None,
     json: Json = False,
     verbose: Verbose = False,
 ) -> int | None:
     """Show what a log is: format, clock, span, topics with rows, rates, fields.
 
-    Its buses are shown too, word by word with -v.
+    Its buses are shown too, word by word with -v. With --together, the logs of one flight are shown as one.
     """
     from groundstation.cli import printing
+    from groundstation.pipeline.one_flight.configuration import load_configuration
     from groundstation.pipeline.one_flight.convert import why_nothing_is_placed
     from groundstation.pipeline.verbs import describe
 
     bounds = time_bound(timeout)
     if bounds is not None:
         from groundstation.pipeline.verbs import check_apart as apart
+    if together and (bounds is not None or suggest_icd):
+        raise UsageError("--together", "--timeout or --suggest-icd", "--together without them")
     if suggest_icd:
-        tell(apart.suggest_icd_apart(log, bounds) if bounds is not None else describe.suggest_icd(log))
+        if len(logs) > 1:
+            raise UsageError("--suggest-icd", counted(len(logs), "log"), "one log")
+        tell(apart.suggest_icd_apart(logs[0], bounds) if bounds is not None else describe.suggest_icd(logs[0]))
         return DONE
     icds = tuple(icd or ())
 
@@ -79,18 +88,21 @@ def info(
             return apart.describe_apart(path, profile, icds, bounds, is_alone=is_alone)
         return describe.describe(path, profile, icds, is_alone=is_alone)
 
-    if log.is_dir():
+    if not together and (len(logs) > 1 or logs[0].is_dir()):
         from groundstation.cli.listing import describe_listed
         from groundstation.pipeline.verbs.named_logs import logs_named
 
-        named = logs_named([log], profile)
-        if named.has_folder:
+        named = logs_named(logs, profile)
+        if named.has_folder or len(named.logs) > 1:
             return describe_listed(named, partial(described, is_alone=False), as_json_text=json)
-    description = described(log, is_alone=True)
+    if together:
+        description = describe.describe_together(logs, load_configuration(profile=profile, icds=icd))
+    else:
+        description = described(logs[0], is_alone=True)
     shown = printing.as_json(description.to_dict()) if json else printing.description(description, everything=verbose)
     tell(shown)
     if not description.has_records:
-        say(f"error: {log.name}: {why_nothing_is_placed(description.findings)}")
+        say(f"error: {logs[0].name}: {why_nothing_is_placed(description.findings)}")
         return FAILED
     return DATA_LOST if description.has_lost_data else DONE
 

@@ -21,7 +21,8 @@ GRAVITY: tuple[Tone, ...] = ("bad", "warn", "plain")
 CAPTION = (
     "Error: INS heading − true heading; ± 95 %: half of its interval; reference: corrected parking heading minus "
     "reference; INS: radial error rate, time-position fit; 60 min: RMS error of the forecast after 60 min "
-    "without GNSS; approaches: those not stabilised in brackets. A column that no flight fills is left out."
+    "without GNSS, the error that 95 % of its starts stay below, and that of the raw INS; approaches: those not "
+    "stabilised in brackets. A column that no flight fills is left out."
 )
 LINKED = (("recording", "rrd"), ("mcap", "mcap"))
 
@@ -162,6 +163,8 @@ COLUMNS = (
         "radial_error_rate_fit_nmiph",
     ),
     Column(Head("60 min, m", True), lambda row: bounded(row["forecast_60min_rms_m"], 0), "forecast_60min_rms_m"),
+    Column(Head("95 %, m", True), lambda row: bounded(row["forecast_60min_p95_m"], 0), "forecast_60min_p95_m"),
+    Column(Head("Raw 95 %, m", True), lambda row: bounded(row["raw_60min_p95_m"], 0), "raw_60min_p95_m"),
     Column(Head("Duration", True), lambda row: duration(row["duration_s"]), "duration_s"),
     Column(Head("Approaches"), _approaches, "landing_approaches"),
     Column(Head("Health"), _graded("health_verdict", GRADES), "health_verdict"),

@@ -1,9 +1,10 @@
 """Description of a log for the verb ``info``: format, clock, span and topics."""
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from groundstation.base.findings import Finding
@@ -13,6 +14,7 @@ from groundstation.base.signals import BUS_PREFIX
 from groundstation.base.units import NS_PER_S
 from groundstation.base.words import length_text
 from groundstation.pipeline.many_flights.inputs import no_log
+from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.log import Log, as_log, open_log, open_one_of_several
 from groundstation.pipeline.one_flight.segments import PowerUpTold, segments_in, segments_of, told_of
 from groundstation.pipeline.verbs.recordings import facts_of_recording, is_of_rerun
@@ -95,6 +97,24 @@ def describe(
         return Description(facts_of_recording(path), (), (), False)
     log = (open_log if is_alone else open_one_of_several)(path, profile, icds)
     return _stored(log) if log.is_store else _recorded(log)
+
+
+def describe_together(paths: Sequence[Path], configuration: Configuration) -> Description:
+    """Describe logs of one flight as one, joined as ``run --together`` joins them.
+
+    Raises
+    ------
+    UsageError, UnreadableLogError
+        When a log is missing or given twice, there is but one, or none can be read.
+    """
+    from groundstation.pipeline.one_flight.join import join_files
+
+    with TemporaryDirectory(prefix="groundstation-") as folder:
+        target = Path(folder) / "together.mcap"
+        joined = join_files(paths, target, configuration)
+        found = _stored(open_log(target, None, configuration.icds))
+    size = sum(path.stat().st_size for path in paths)
+    return replace(found, facts={**found.facts, "file": joined.info.source_name, "size": f"{size} bytes"})
 
 
 def _recorded(log: Log) -> Description:

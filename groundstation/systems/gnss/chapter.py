@@ -47,6 +47,10 @@ ABSENT = "—"
 NOT_LOGGED = "not logged"
 MOST_ROWS = 20
 NO_HEADING = "No heading source in the log: track only."
+OF_SIGNALS = (
+    "C/N0 is the mean of all signals, faint second frequencies too, and has no part in the grade: limits in use are of "
+    "the strongest signals (u-blox, RF design for GPS receivers, 7.4: 50 dB-Hz under open sky, below 40 degraded)."
+)
 NOT_JUDGED = (
     "The log has neither the kind of fix nor satellites, dilution or claimed accuracy: only losses and jumps show."
 )
@@ -91,7 +95,7 @@ def _claim(answer: GnssReception) -> Claim:
     told = [
         ("Satellites", number(main.satellites_used, 0), "median"),
         ("HDOP", number(main.hdop, 1), "median") if main.hdop is not None else ("PDOP", number(main.pdop, 1), "median"),
-        ("C/N0", number(main.cn0_dbhz, 0, "dB-Hz"), "median"),
+        ("C/N0", number(main.cn0_dbhz, 0, "dB-Hz"), "mean of all signals, not judged"),
     ]
     stood = main.told_standstill
     if stood is not None and not stood.is_held and not stood.is_coarse:
@@ -145,6 +149,8 @@ def _quality(answer: GnssReception) -> Grid:
     heads = (Head("Quantity"), *(Head(one.topic, True) for one in answer.receivers))
     rows = [(title, *(told(one) for one in answer.receivers)) for title, told in QUALITY]
     caption = "Medians over the time with a fix; in brackets what one twentieth of the time is beyond."
+    if any(one.cn0_dbhz is not None for one in answer.receivers):
+        caption += f" {OF_SIGNALS}"
     return Grid("Quality", heads, rows, caption, ("gnss_quality",))
 
 

@@ -204,7 +204,6 @@ def correlation_time_s(offset_m: FloatArray, step_s: float) -> float | None:
 def memory_of_means_s(averaged_s: FloatArray, scatter_m: FloatArray) -> float:
     """Return how long errors last by the scatter of means, the longest of all.
 
-
     Values that are independent after ``2 t`` leave ``scatter * sqrt(2 t / T)`` of a mean over ``T``. Errors of several
     durations look shorter where they are first correlated by less than 1/e: their means tell the longest.
 

@@ -6,6 +6,8 @@ from groundstation.systems.inertial.cause_answer import CauseParameter, CausesRe
 from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.systems.inertial.units_answer import UnitsResult
 
+RAW_INS = "raw_ins"  # method of the forecast that corrects nothing
+
 INERTIAL_COLUMNS: tuple[AnswerColumn[InertialResult], ...] = (
     AnswerColumn("ins_kind", "category", "unaided, gnss_aided or unknown", lambda inertial: inertial.kind),
     AnswerColumn(
@@ -26,6 +28,11 @@ def _rms_m(forecast: ForecastResult, horizon_min: float) -> float | None:
     return rows.get(horizon_min)
 
 
+def _p95_m(forecast: ForecastResult, method: str, horizon_min: float) -> float | None:
+    """Radial error of a method that 95 % of the starts stay below; None where it was not replayed."""
+    return next((row.p95_m for row in forecast.skill if (row.method, row.horizon_min) == (method, horizon_min)), None)
+
+
 FORECAST_COLUMNS: tuple[AnswerColumn[ForecastResult], ...] = (
     AnswerColumn(
         "forecast_method", "category", "method the forecast figures belong to", lambda forecast: forecast.default_method
@@ -38,6 +45,15 @@ FORECAST_COLUMNS: tuple[AnswerColumn[ForecastResult], ...] = (
     ),
     AnswerColumn("forecast_60min_rms_m", "number", "after 60 min", lambda forecast: _rms_m(forecast, 60.0)),
     AnswerColumn("forecast_120min_rms_m", "number", "after 120 min", lambda forecast: _rms_m(forecast, 120.0)),
+    AnswerColumn(
+        "forecast_60min_p95_m",
+        "number",
+        "radial error of the forecast after 60 min that 95 % of the starts stay below",
+        lambda forecast: _p95_m(forecast, forecast.default_method, 60.0),
+    ),
+    AnswerColumn(
+        "raw_60min_p95_m", "number", "the same of the raw INS", lambda forecast: _p95_m(forecast, RAW_INS, 60.0)
+    ),
 )
 
 
