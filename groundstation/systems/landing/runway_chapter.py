@@ -104,7 +104,7 @@ def path_told(one: Approach) -> str:
     return (
         f"Height and guidance disagree: the guided path ends {number(abs(found.error_m), 0, 'm')} "
         f"{'before' if found.error_m < 0.0 else 'beyond'} the touchdown zone assumed "
-        f"(95 % {interval((low_m, high_m), 0, 'm')}): the guidance has another one"
+        f"(95 % {number(low_m, 0)} … {number(high_m, 0, 'm')}): the guidance has another one"
         f"{end and f', or the threshold was not displaced yet (by {end})'}."
     )
 
