@@ -163,6 +163,9 @@ def _approach(
         _sensitivity(path, relative, runway, source, float(np.hypot(*step_m))) if path.guidance_topic else None
     )
     errors, along = _position_errors(flight, path, final, runway, relative, source, sensitivity, settings)
+    offset = None
+    if final.guided is not None and SATELLITES in source:
+        _, offset = _errors_of(flight, path.position_topic, path, runway, relative, final.guided, final, settings)
     protection = protection_along(flight, path.time_s[final.first], final.end.time_s, number)
     lands = final.end.touches
     touchdown = touchdown_of(flight, path, final, runway, relative, estimated) if lands else None
@@ -189,6 +192,7 @@ def _approach(
         claim=_claim(errors, runway),
         position_step_m=step_m if any(step_m) else None,
         along_errors=along,
+        path_offset=offset,
         touchdown_reason=SET_DOWN if lands and is_set_down(path, final.end) else "",
         height_errors=_height_errors(flight, path, runway, final.end.time_s, settings) if lands else (),
         criteria=criteria,

@@ -277,6 +277,8 @@ class Approach(Brief):
     #: Why there is no touchdown; empty where there is one.
     touchdown_reason: str = ""  # why a landing has no touchdown
     along_errors: tuple[AlongError, ...] = ()  #: Recorded positions along the course, by the glide path.
+    #: Positions along the course by the path of satellite guidance; what is beyond sigma is of its path or threshold.
+    path_offset: AlongError | None = None
     criteria: tuple[Criterion, ...] = ()  #: The user's own criteria.
     score: Score | None = None  #: Share of the user's weights that was met; null without weights.
 

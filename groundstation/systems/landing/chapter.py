@@ -44,7 +44,7 @@ from groundstation.systems.landing.answer import (
     PositionError,
 )
 from groundstation.systems.landing.criteria_chapter import criteria_parts
-from groundstation.systems.landing.runway_chapter import along_facts, along_told, runway_facts, with_sigma
+from groundstation.systems.landing.runway_chapter import along_facts, along_told, path_told, runway_facts, with_sigma
 from groundstation.systems.landing.touchdown_chapter import SINK_TIME, touchdown_parts
 from groundstation.systems.landing.verdict_answer import verdict_words, worst_verdict
 
@@ -216,6 +216,7 @@ def _told(one: Approach) -> str:
     """Return what a reader must know before the figures."""
     told = [_accuracy(error) for error in one.position_errors[:2]]
     told += filter(None, (along_told(error) for error in one.along_errors[:2]))
+    told.append(path_told(one))
     if one.protection is not None:
         told.append(
             "No reference: protection levels bound the error at the integrity that the receiver claims; they are not "
@@ -223,7 +224,7 @@ def _told(one: Approach) -> str:
         )
     if not one.guidance_topic:
         told.append("The log has no guidance; deviations are those of the positions from a line through them.")
-    return " ".join(told)
+    return " ".join(filter(None, told))
 
 
 def _accuracy(error: PositionError) -> str:

@@ -65,16 +65,15 @@ def _criterion(name: str) -> Callable[[LandingResult], float | None]:
     return _last(lambda one: next((row.value for row in one.criteria if row.name == name), None))
 
 
-def _states(state: str) -> Callable[[Approach], str]:
-    """Return the names of all criteria of an approach that are in a state."""
-    gates = {"met": "passed", "not met": "failed"}
-
-    def of(one: Approach) -> str:
-        found = [gate.name for check in one.stabilised for gate in check.gates if gate.state == gates[state]]
-        found += [row.name for row in one.criteria if row.state == state]
-        return " ".join(dict.fromkeys(found))
-
-    return of
+def criteria_not_met(one: Approach) -> str:
+    """Return the criteria that are not met, with their sides: "vertical_high bank_left"."""
+    found = []
+    for check in one.stabilised:
+        sides = {place.name: place.side for place in check.places}
+        failed = (gate.name for gate in check.gates if gate.state == "failed")
+        found += ["_".join(filter(None, (name, sides.get(name, "")))) for name in failed]
+    found += [row.name for row in one.criteria if row.state == "not met"]
+    return " ".join(dict.fromkeys(found))
 
 
 def _score(one: Approach) -> float | None:
@@ -102,7 +101,10 @@ COLUMNS: tuple[AnswerColumn[LandingResult], ...] = (
         _last(_at_the_low_check),
     ),
     AnswerColumn(
-        "landing_criteria_not_met", "text", "criteria of the last approach that are not met", _last(_states("not met"))
+        "landing_criteria_not_met",
+        "text",
+        "criteria of the last approach that are not met, with their side",
+        _last(criteria_not_met),
     ),
     AnswerColumn(
         "landing_unstable_approaches",

@@ -92,6 +92,23 @@ def along_told(error: AlongError) -> str:
     return f"{told} It is {shown} if the threshold was not displaced yet when this was flown."
 
 
+def path_told(one: Approach) -> str:
+    """Return a sentence where height and satellite guidance disagree; empty elsewhere."""
+    found = one.path_offset
+    if found is None or found.error_m is None or found.sigma_m is None or found.confidence95_m is None:
+        return ""
+    if abs(found.error_m) <= 2.0 * found.sigma_m:
+        return ""
+    low_m, high_m = sorted(abs(end) for end in found.confidence95_m)
+    end = number(one.runway.displaced_m, 0, "m") if _fits_the_end_better(found) else ""
+    return (
+        f"Height and guidance disagree: the guided path ends {number(abs(found.error_m), 0, 'm')} "
+        f"{'before' if found.error_m < 0.0 else 'beyond'} the touchdown zone assumed "
+        f"(95 % {number(low_m, 0)} … {number(high_m, 0, 'm')}): the guidance has another one"
+        f"{end and f', or the threshold was not displaced yet (by {end})'}."
+    )
+
+
 def _fits_the_end_better(error: AlongError) -> bool:
     """Tell whether an undisplaced threshold would explain an error beyond its sigmas."""
     if error.error_from_end_m is None or error.error_m is None or error.sigma_m is None:

@@ -9,6 +9,7 @@ import pytest
 
 from groundstation.base.angles import wrap_180
 from groundstation.base.errors import NotAssessableError, SettingsError
+from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.api import open_flight
@@ -26,6 +27,7 @@ from groundstation.systems.known import Known, Runway, SiteData
 from groundstation.systems.landing.analysis import LANDING
 from groundstation.systems.landing.answer import Approach, LandingResult
 from groundstation.systems.landing.path import step_of
+from groundstation.systems.landing.runway_chapter import path_told
 from groundstation.systems.landing.settings import LandingSettings
 from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight, Table
@@ -133,6 +135,36 @@ def test_an_unstable_final_is_not_stabilised() -> None:
     result = found(simulate_approach(scenario).flight, site(scenario), established_vertical_dots=2.0)
     assert result.answer.approaches[0].stabilised[1].verdict == "not stabilised"
     assert "landing.not_stabilised" in {finding.code for finding in result.findings}
+
+
+@pytest.mark.parametrize(
+    ("site_off_m", "displaced_m", "told"),
+    [(0.0, None, ""), (300.0, None, "another one."), (300.0, 280.0, "or the threshold was not displaced yet (by 280")],
+)
+def test_satellite_guidance_to_another_touchdown_zone_is_questioned(
+    site_off_m: float, displaced_m: float | None, told: str
+) -> None:
+    """The site file has the threshold so far beyond that which the guidance leads to."""
+    flight = simulate_approach(replace(PLAIN, recorded=EXACT)).flight
+    guidance = flight["guidance"]
+    named = Column(np.full(len(guidance), "GPS"))
+    table = replace(guidance, columns={**guidance.columns, "source": named})
+    latitude_deg, longitude_deg = latitude_longitude_deg(
+        *(site_off_m * part for part in (np.cos(np.deg2rad(47.0)), np.sin(np.deg2rad(47.0)))), 56.0, 38.0
+    )
+    where = site(PLAIN)
+    moved = replace(where.runways[0], latitude_deg=float(latitude_deg), longitude_deg=float(longitude_deg))
+    (one,) = found(
+        replace(flight, tables={**flight.tables, "guidance": table}), SiteData(runways=(moved,))
+    ).answer.approaches
+    assert one.path_offset is not None and one.path_offset.sigma_m is not None and not one.along_errors
+    assert one.path_offset.error_m == pytest.approx(-site_off_m, abs=2.0 * one.path_offset.sigma_m)
+    if displaced_m is not None:
+        offset = replace(one.path_offset, error_from_end_m=one.path_offset.error_m + displaced_m)
+        one = replace(one, runway=replace(one.runway, displaced_m=displaced_m), path_offset=offset)
+    sentence = path_told(one)
+    assert bool(sentence) is bool(told) and told in sentence.replace("\u202f", " ")
+    assert not told or "before the touchdown zone assumed" in sentence
 
 
 def test_a_reversed_localizer_is_told_and_is_no_reference() -> None:

@@ -24,6 +24,7 @@ from groundstation.systems import systems
 from groundstation.systems.landing.analysis import LANDING
 from groundstation.systems.landing.answer import GatePlace, LandingResult, StabilisedAt, StabilityLost
 from groundstation.systems.landing.chapter import landing
+from groundstation.systems.landing.columns import criteria_not_met
 from groundstation.systems.landing.criteria_answer import Place
 from groundstation.systems.landing.plots import deviations
 from groundstation.systems.landing.stabilised import decide
@@ -115,6 +116,7 @@ def test_terminal_findings_page_and_table_say_one_thing_with_its_side(above_path
     line = LANDING.sentence(by_analysis(run.answer))
     assert f"glide path up to {told.split('glide path up to ')[1].split(',')[0].split(':')[0]}" in line
     assert re.findall(r"\d (?:failed|held|not judged)", line) == counts
+    assert f"vertical_{side}" in criteria_not_met(one).split()
     (finding,) = (finding for finding in run.findings if finding.code == "landing.not_stabilised")
     assert finding.text == f"approach 1 not stabilised: {told}"
     section = landing(replace(results(True), answers=by_analysis(run.answer), figures=run.answer.figures))
