@@ -55,7 +55,8 @@ class Mapper:
         """Take in the rows of one sensor; types that map to nothing are passed over."""
         for topic, columns_of in self._takers.get((rows.definition.name, rows.instance), ()):
             validity_ns = self._validity_ns(topic, rows)
-            part = occupied(TopicPart(rows.record_index, rows.time_ns, columns_of(topic, rows), validity_ns))
+            source = rows.definition.name if rows.instance is None else f"{rows.definition.name}.{rows.instance}"
+            part = occupied(TopicPart(rows.record_index, rows.time_ns, columns_of(topic, rows), validity_ns, source))
             if part is not None and len(part.index):
                 self._parts.setdefault(topic, []).append(part)
 
