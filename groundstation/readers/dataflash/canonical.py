@@ -191,7 +191,7 @@ class Mapper:
     def _of_core(
         self, core: int | None, wanted: tuple[FieldRule, ...], is_solution: bool, is_used: bool = True
     ) -> Callable[[str, RecordRows], dict[str, Column]]:
-        """Return the function for columns that are present while this filter core is in use, and initialised.
+        """Return the function for columns of a filter core that is in use and initialised.
 
         Until the log tells the core in use, it is the first one that it tells. ``is_used`` false: while another
         estimator gave the attitude.
