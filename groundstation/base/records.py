@@ -88,6 +88,8 @@ class RecordBatch:
     validity_time_ns : ndarray of int64, shape (n,), optional
         Time at which the values were true, where it is not ``time_ns``. Readers give it by the device's clock; where it
         is the device time itself, values are valid at the corrected time of their record.
+    sources : ndarray of int64, shape (n,), optional
+        Number of the messages that each row is of, where a topic is made of several: each has an order of its own.
     """
 
     topic: str
@@ -96,6 +98,7 @@ class RecordBatch:
     columns: Mapping[str, Column]
     time_ns: Int64Array | None = None
     validity_time_ns: Int64Array | None = None
+    sources: Int64Array | None = None
 
     def __len__(self) -> int:
         return len(self.record_index)
@@ -114,6 +117,7 @@ class RecordBatch:
             {name: Column(one.values[index], taken.get(id(one.present))) for name, one in self.columns.items()},
             None if self.time_ns is None else self.time_ns[index],
             None if self.validity_time_ns is None else self.validity_time_ns[index],
+            None if self.sources is None else self.sources[index],
         )
 
 

@@ -26,6 +26,7 @@ from groundstation.integrity.pauses import Outline, outline_of, pauses_of, stops
 from groundstation.integrity.places import PieceOnDisk, Places
 from groundstation.integrity.rhythm import rhythm_of
 from groundstation.integrity.source_clock import ClockPass, PowerUpClock, clock_of
+from groundstation.integrity.steps_by_source import StepsBySource
 
 
 @dataclass(frozen=True)
@@ -128,9 +129,11 @@ def _surveyed(items: Iterable[Item], places: Places, limits: Thresholds) -> Surv
     remarks: list[Remark] = []
     pieces: dict[str, list[PieceOnDisk]] = {}
     contents, references = Contents(limits), ClockReferences(limits.clock_relation)
+    steps = StepsBySource()
     for item in items:
         if isinstance(item, RecordBatch):
             if len(item):
+                steps.add(item)
                 pieces.setdefault(item.topic, []).append(places.of(item))
                 contents.add(item)
                 references.add(item)
@@ -146,7 +149,7 @@ def _surveyed(items: Iterable[Item], places: Places, limits: Thresholds) -> Surv
     clock = replace(clock, relations=references.relations(clock))
     found, silences = _NO_TOPICS, _Silences()
     if clock.has_times:
-        found, silences = _counted(partial(_times, places, pieces, clock), contents, clock, limits)
+        found, silences = _counted(partial(_times, places, pieces, clock, steps), contents, clock, limits)
     topics = found.topics
     remarks += doubtful_dates(header.reader, clock, topics, remarks)
     clock = replace(clock, lateness_ns=found.lateness_ns)
@@ -185,7 +188,9 @@ class _Counted(NamedTuple):
 _NO_TOPICS = _Counted((), {}, ())
 
 
-def _times(places: Places, pieces: Mapping[str, Sequence[PieceOnDisk]], clock: ClockModel) -> Iterator[_Times]:
+def _times(
+    places: Places, pieces: Mapping[str, Sequence[PieceOnDisk]], clock: ClockModel, steps: StepsBySource
+) -> Iterator[_Times]:
     """Yield the times of all topics; those that are sampled together share theirs."""
     together: dict[tuple[int, ...], list[str]] = {}
     for topic, several in pieces.items():
@@ -193,7 +198,8 @@ def _times(places: Places, pieces: Mapping[str, Sequence[PieceOnDisk]], clock: C
     for topics in together.values():
         order = _order_of(places, pieces[topics[0]], clock)
         for topic in topics:
-            yield _Times(topic, order.valid_ns, order.backward_steps, order.stray_rows, order.lateness_ns)
+            backward = steps.counts.get(topic, order.backward_steps)
+            yield _Times(topic, order.valid_ns, backward, order.stray_rows, order.lateness_ns)
 
 
 def _counted(

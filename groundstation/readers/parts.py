@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +24,19 @@ MOST_LATE_NS = 1_000_000_000  # from the time at which values were true to that 
 class TopicPart:
     """Columns of one topic from one source, with their places in the log and device time.
 
-    ``validity_ns`` is the time of validity, where it differs from the device time.
+    ``validity_ns`` is the time of validity, where it differs from the device time; ``source`` names the messages.
     """
 
     index: Int64Array
     time: Column
     columns: dict[str, Column]
     validity_ns: Int64Array | None = None
+    source: str = ""
+
+    @property
+    def sources(self) -> Int64Array | None:
+        """Number of the source for each row, shape (n,); None where it has no name."""
+        return np.broadcast_to(np.int64(crc32(self.source.encode())), len(self.index)) if self.source else None
 
 
 def sampled_ns(time: Column, told_ns: NDArray[Any]) -> Int64Array | None:
@@ -74,7 +81,7 @@ def occupied(part: TopicPart) -> TopicPart | None:
     taken = {identity: frozen(mask[rows]) for identity, mask in masks.items()}
     kept = {name: Column(column.values[rows], taken[id(column.present)]) for name, column in part.columns.items()}
     validity_ns = None if part.validity_ns is None else part.validity_ns[rows]
-    return TopicPart(part.index[rows], part.time.take(rows), kept, validity_ns)
+    return TopicPart(part.index[rows], part.time.take(rows), kept, validity_ns, part.source)
 
 
 def merged(topic: str, parts: Sequence[TopicPart]) -> RecordBatch:
@@ -84,7 +91,9 @@ def merged(topic: str, parts: Sequence[TopicPart]) -> RecordBatch:
     """
     if len(parts) == 1:
         one = parts[0]
-        return RecordBatch(topic, one.index, one.time, one.columns, validity_time_ns=one.validity_ns)
+        return RecordBatch(
+            topic, one.index, one.time, one.columns, validity_time_ns=one.validity_ns, sources=one.sources
+        )
     index = np.concatenate([part.index for part in parts])
     order = np.argsort(index, kind="stable")
     places = np.empty_like(order)
@@ -105,7 +114,16 @@ def merged(topic: str, parts: Sequence[TopicPart]) -> RecordBatch:
     if any(part.validity_ns is not None for part in parts):
         each = [part.time.values if part.validity_ns is None else part.validity_ns for part in parts]
         validity_ns = np.concatenate(each)[order]
-    return RecordBatch(topic, index[order], time, columns, validity_time_ns=validity_ns)
+    named = [part.sources for part in parts]
+    sources = None if any(one is None for one in named) else np.concatenate([one for one in named if one is not None])
+    return RecordBatch(
+        topic,
+        index[order],
+        time,
+        columns,
+        validity_time_ns=validity_ns,
+        sources=None if sources is None else sources[order],
+    )
 
 
 def _values(pieces: Sequence[tuple[Int64Array, Column]], rows: int) -> NDArray[Any]:
@@ -161,4 +179,6 @@ def one_row_each(batch: RecordBatch) -> RecordBatch:
         values[at], present[at] = column.values[mask], True
         columns[name] = Column(values, None if present.all() else present)
     index, time = batch.record_index[first], batch.device_time_ns.take(first)
-    return RecordBatch(batch.topic, index, time, columns, validity_time_ns=stamps[first]).take(np.argsort(index))
+    sources = None if batch.sources is None else batch.sources[first]
+    made = RecordBatch(batch.topic, index, time, columns, validity_time_ns=stamps[first], sources=sources)
+    return made.take(np.argsort(index))

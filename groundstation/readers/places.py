@@ -1,4 +1,4 @@
-"""Rows that hold zeros in place of values: without a position, and of a filter without states."""
+"""Rows that hold zeros in place of values: no position, or a filter without states."""
 
 from collections.abc import Mapping
 
@@ -82,6 +82,9 @@ def nowhere(topic: str, count: int, place: str = "the whole log") -> Damage:
 
 
 def unready_filter(topic: str, count: int, records: str) -> Damage:
-    """Return a damage that counts rows of a filter that was not initialised; the raw values keep them."""
+    """Return a damage that counts rows of a filter that was not initialised.
+
+    The raw values keep them.
+    """
     what = f"records of {records} while the filter was not initialised, by its own status: not taken for a solution"
     return Damage("no_solution", "the whole log", count, what, topic, loses_data=False)

@@ -356,7 +356,7 @@ def _labels(
 
 
 def _turns(motion: Motion) -> BoolArray:
-    """Tell where the attitude turns: what turns does not stand, and a jump of the estimate is no turn."""
+    """Tell where the attitude turns; a jump of the estimate is no turn."""
     turns = np.zeros(len(motion), dtype=bool)
     half = round(0.5 * RATE_HZ)
     for angle_deg in (motion.heading_deg, motion.roll_deg, motion.pitch_deg):

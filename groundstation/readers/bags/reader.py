@@ -3,6 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -147,7 +148,7 @@ class _Topics:
                 for feed in self._found.feeds.get(number, ()):
                     columns, zeros = placed(feed.topic, feed.of(decoded.columns))
                     self._nowhere[feed.topic] += len(zeros)
-                    of_topic = occupied(TopicPart(part.index, part.time, columns, part.validity_ns))
+                    of_topic = occupied(replace(part, columns=columns))
                     if of_topic is not None:
                         canonical.setdefault(feed.topic, []).append(of_topic)
         for topic, parts in raw.items():
@@ -167,7 +168,8 @@ class _Topics:
             columns[PUBLISHER] = Column(np.full(len(log_ns), publisher[:MAX_TEXT_CHARACTERS] or "_"))
         time = Column(log_ns, None if is_time.all() else is_time)
         index = block.record_index[decoded.rows]
-        return TopicPart(index, time, columns, self._validity(block.connection.number, decoded, index, log_ns))
+        number = block.connection.number
+        return TopicPart(index, time, columns, self._validity(number, decoded, index, log_ns), str(number))
 
     def _decoder(self, connection: Connection) -> Decoder:
         kinds = self._kinds.setdefault(self._names[connection.number], {})

@@ -55,7 +55,8 @@ class Mapper:
         """Take in the rows of one sensor; types that map to nothing are passed over."""
         for topic, columns_of in self._takers.get((rows.definition.name, rows.instance), ()):
             validity_ns = self._validity_ns(topic, rows)
-            part = occupied(TopicPart(rows.record_index, rows.time_ns, columns_of(topic, rows), validity_ns))
+            source = rows.definition.name if rows.instance is None else f"{rows.definition.name}.{rows.instance}"
+            part = occupied(TopicPart(rows.record_index, rows.time_ns, columns_of(topic, rows), validity_ns, source))
             if part is not None and len(part.index):
                 self._parts.setdefault(topic, []).append(part)
 
@@ -190,7 +191,7 @@ class Mapper:
     def _of_core(
         self, core: int | None, wanted: tuple[FieldRule, ...], is_solution: bool, is_used: bool = True
     ) -> Callable[[str, RecordRows], dict[str, Column]]:
-        """Return the function for columns that are present while this filter core is in use, and initialised.
+        """Return the function for columns of a filter core that is in use and initialised.
 
         Until the log tells the core in use, it is the first one that it tells. ``is_used`` false: while another
         estimator gave the attitude.

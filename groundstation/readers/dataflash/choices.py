@@ -213,7 +213,10 @@ def _cores(found: DataflashOverview, ekf: str, number: str) -> dict[Unit, int | 
 
 
 def _attitude_numbers(found: DataflashOverview, ekf: str) -> list[int]:
-    """Return the estimators that gave the attitude, the one of the parameters last; none where the log is silent."""
+    """Return the estimators that gave the attitude, the one of the parameters last.
+
+    None where the log is silent.
+    """
     kind = found.parameters.get("AHRS_EKF_TYPE")
     told = _DCM if found.parameters.get("AHRS_EKF_USE") == 0.0 else None if kind is None else int(kind)
     logged = set(found.attitude_by.values.tolist())

@@ -303,7 +303,10 @@ class _Survey:
                 self._add_unready((definition.name, part.instance), part)
 
     def _add_unready(self, core: Unit, rows: RecordRows) -> None:
-        """Add from where on a core was initialised, or no more: behind its last status of another state."""
+        """Add from where on a core was initialised, or no more.
+
+        That is behind its last status of another state.
+        """
         state = rows.values("FS").astype(np.int64) >> _NOT_INITIALISED & 1
         begins = np.concatenate(([self._last_status.get(core, -1)], rows.record_index[:-1])) + 1
         changed = np.flatnonzero(np.diff(state, prepend=-1))

@@ -1,4 +1,6 @@
-"""The autopilot's own estimate in telemetry: whether its filter had states, and which estimator gave the attitude.
+"""The autopilot's own estimate in telemetry.
+
+It tells whether its filter had states, and which estimator gave the attitude.
 
 Source: ArduPilot, EKF_STATUS_REPORT of ardupilotmega.xml (EKF_UNINITIALIZED), GCS_MAVLink send_global_position_int
 (velocities are zeros where the filter has none), AHRS_EKF_TYPE of AP_AHRS.h.
@@ -21,7 +23,10 @@ _NAMES = {0.0: "attitude by DCM", 10.0: "the simulator's truth"}  # by AHRS_EKF_
 
 @dataclass
 class OwnEstimate:
-    """State of the vehicle's filter, message by message; ``unready`` counts velocities that are none."""
+    """State of the vehicle's filter, message by message.
+
+    ``unready`` counts velocities that are none.
+    """
 
     unready: int = 0
     _index: Int64Array = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
@@ -44,7 +49,7 @@ class OwnEstimate:
                 self._type = float(part.columns["param_value"].values[is_type][-1])
 
     def ready(self, columns: Mapping[str, Column], index: Int64Array) -> dict[str, Column]:
-        """Return the columns of messages without velocities of zero while the filter had no states."""
+        """Return the columns without velocities of zero while the filter had no states."""
         kept = dict(columns)
         if not kept.keys() >= set(VELOCITY) or not self._is_unready.any():
             return kept

@@ -5,7 +5,7 @@ Each message comes raw, and canonical where a rule serves it.
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -198,7 +198,7 @@ def _part(block: FrameBlock, which: Int64Array, message: DialectMessage, validit
         else:
             columns[name] = Column(values.copy())
     validity = None if validity_ns is None else validity_ns[which]
-    return TopicPart(block.first_index + which, block.received.take(which), columns, validity)
+    return TopicPart(block.first_index + which, block.received.take(which), columns, validity, message.name)
 
 
 def _served(met: Mapping[str, frozenset[str]]) -> dict[str, list[Assignment]]:
@@ -231,7 +231,7 @@ def _take(
         nowhere[one.topic] += len(zeros)
         if one.topic == "ins":
             columns = own.ready(columns, part.index)
-        kept = occupied(TopicPart(part.index, part.time, columns, part.validity_ns))
+        kept = occupied(replace(part, columns=columns))
         if kept is not None:
             canonical.setdefault(one.topic, []).append(kept)
 

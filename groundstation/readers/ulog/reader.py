@@ -197,7 +197,8 @@ class _CanonicalTopics:
                 self._note_refused(name, columns[_OF_PRESSURE])
             columns, zeros = placed(name, columns)
             self._losses.nowhere[name] += len(zeros)
-            part = occupied(TopicPart(index, time, columns, sampled.get(name)))
+            source = f"{topic.name}.{topic.instance}"
+            part = occupied(TopicPart(index, time, columns, sampled.get(name), source))
             if part is not None:
                 self._parts.setdefault(name, []).append(part)
         if self._found.arming and topic.instance == 0 and topic.name == self._found.arming[0]:

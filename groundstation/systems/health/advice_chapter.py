@@ -1,4 +1,7 @@
-"""Advice on what to inspect before the next flight: after a lost attitude or a fall, and by what failed."""
+"""Advice on what to inspect before the next flight.
+
+It follows a lost attitude, a fall, or a check that failed.
+"""
 
 from collections.abc import Iterator
 
@@ -34,8 +37,9 @@ def advise(results: FlightResults) -> Iterator[Advice]:
         text = "the battery, the power supply, motors and propellers"
         yield Advice("Check", text, FELL, is_pressing=True, is_danger=True)
     for setting in answer.settings_found:
-        if setting.verdict == "warn":
-            yield Advice("Check", with_signs(setting.told), "", is_pressing=True)
+        if setting.verdict == "warn" and setting.found is not None:
+            told = f"{setting.stated:.3g} {setting.unit} set, {setting.found:.3g} {setting.unit} found"
+            yield Advice("Check", f"the setting {setting.name} ({with_signs(told)})", "", is_pressing=True)
     if loss is None:
         failed = [one.key for one in answer.checks if one.key in SENSORS and _is_inspected(one)]
         for text in dict.fromkeys(SENSORS[key] for key in failed):
@@ -43,7 +47,10 @@ def advise(results: FlightResults) -> Iterator[Advice]:
 
 
 def _is_inspected(check: Check) -> bool:
-    """Tell whether a check asks for a look: it failed, or the heading warns, which no pilot sees."""
+    """Tell whether a check asks for a look.
+
+    It failed, or the yaw warns, which no pilot sees.
+    """
     return check.verdict == "fail" or (check.key == "yaw" and check.is_bad)
 
 

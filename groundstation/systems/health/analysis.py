@@ -204,7 +204,8 @@ def _finding(check: Check) -> Finding:
     if check.first_event_s is not None:
         place = f"at {check.first_event_s:.1f} s"
     elif measure is not None:
-        topic = measure.source.rpartition(".")[0]
+        first, against, _ = measure.source.partition(" against ")
+        topic = first.partition(",")[0] if against else measure.source.rpartition(".")[0]
         if measure.span_start_s is not None and measure.span_end_s is not None:
             place = f"{measure.span_start_s:.1f} to {measure.span_end_s:.1f} s"
         else:

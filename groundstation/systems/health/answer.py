@@ -218,7 +218,7 @@ class SettingFound:
 
     @property
     def consequence(self) -> str:
-        """Effect of a setting that is off; empty where it is not, or where the effect is not known."""
+        """Effect of a setting that is off; empty where it is not, or not known."""
         if self.what != DECLINATION or self.verdict != "warn" or self.found is None:
             return ""
         off_deg = float(wrap_180(self.stated - self.found))

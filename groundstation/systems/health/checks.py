@@ -319,7 +319,10 @@ def rise(value: FloatArray, flown: np.ndarray) -> float:
 
 
 def _rises(value: FloatArray, limit: Threshold) -> np.ndarray:
-    """Return the grade of the samples at which a counter rose, by how far it has risen until then."""
+    """Return the grade of the samples at which a counter rose.
+
+    It is by how far the counter has risen until then.
+    """
     grade = np.zeros(len(value), dtype=np.int8)
     known = np.flatnonzero(np.isfinite(value))
     steps = np.diff(value[known])

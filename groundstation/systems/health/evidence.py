@@ -135,7 +135,10 @@ def in_the_air(flight: Flight, known: Known) -> Spans:
 
 
 def not_flown(flight: Flight, air: Spans) -> str:
-    """Return the flag by which an aircraft did not fly; empty where it flew, or where no flag says it."""
+    """Return the flag by which an aircraft did not fly.
+
+    It is empty where it flew, or where no flag says it.
+    """
     if air.words == FLOWN:
         return ""
     if "raw.STAT" in flight and is_number(flight["raw.STAT"], "isFlying"):

@@ -1,10 +1,10 @@
-"""Yaw of the autopilot against its own compass: the heading of the tilt-compensated field, plus the declination.
+"""Yaw of the autopilot against its own compass.
 
-heading = atan2(-(f_y cos r - f_z sin r), f_x cos p + (f_y sin r + f_z cos r) sin p) + declination, with the field f in
-the body, roll r and pitch p. It ignores the deviation of the aircraft, and rows that lean by more than 30 deg, where an
-error of roll or pitch turns the steep field into one of heading.
+Its heading is atan2(-(f_y cos r - f_z sin r), f_x cos p + (f_y sin r + f_z cos r) sin p) + declination, with the field
+f in the body, roll r and pitch p. It ignores the deviation of the aircraft, and rows that lean by more than 30 deg,
+where an error of roll or pitch turns the steep field into one of heading.
 
-Source: Caruso, Applications of Magnetic Sensors for Low Cost Compass Systems, 2000, eq. 2 to 4.
+Source: Caruso, Applications of Magnetic Sensors for Low Cost Compass Systems, 2000.
 """
 
 from collections.abc import Iterator
@@ -50,12 +50,12 @@ def evidence(flight: Flight) -> Iterator[Evidence]:
         heading = magnetic_heading_deg(field, angles[0], angles[1]) + declination[0]
         level = down_of(angles[0], angles[1])[:, 2] >= np.cos(np.deg2rad(LARGEST_LEAN_DEG))
         value = np.where(level, np.abs(wrap_180(angles[2] - heading)), np.nan)
-        source = f"{attitude.topic} against {topic}{declination[1]}"
+        source = f"{topic} against {attitude.topic}{declination[1]}"
         yield Evidence("yaw", QUANTITY, f"magnetometer {number}", source, "deg", table.time_ns, value, number - 1)
 
 
 def magnetic_heading_deg(field: FloatArray, roll_deg: FloatArray, pitch_deg: FloatArray) -> FloatArray:
-    """Return the magnetic heading of a field (forward, right, down) by roll and pitch, degrees, shape (n,).
+    """Return the magnetic heading of a field (forward, right, down), degrees, shape (n,).
 
     Examples
     --------
@@ -74,7 +74,10 @@ def _has_attitude(table: Table) -> bool:
 
 
 def _tells_north(parameters: Parameters) -> bool:
-    """Tell whether the yaw is one from north: that of a camera or another computer need not be."""
+    """Tell whether the yaw is one from north.
+
+    That of a camera or another computer need not be.
+    """
     by_camera = int(parameters.value("EKF2_EV_CTRL") or 0.0) & EXTERNAL_YAW
     return (parameters.value("EK3_SRC1_YAW") or 0.0) in BY_COMPASS and not by_camera
 

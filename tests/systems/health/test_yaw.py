@@ -53,6 +53,11 @@ def test_a_yaw_that_follows_the_compass_passes(roll: float) -> None:
     assert check(made(roll=roll)).verdict == "pass"
 
 
+def test_a_finding_names_the_compass() -> None:
+    told = [one for one in HEALTH.run(made(40.0), KNOWN, HealthSettings()).findings if one.code == "health.yaw"]
+    assert [one.topic for one in told] == ["magnetometer"] and "above 20 deg for 100 % of the time" in told[0].text
+
+
 @pytest.mark.parametrize(
     ("error", "verdict"),
     [
