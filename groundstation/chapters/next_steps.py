@@ -29,6 +29,7 @@ BY_REASON_OF_AN_INS: Remedies = (
     ("no INS position", ("Record", "INS position")),
     ("no INS heading", ("Record", "INS heading")),
 )
+CONTRADICTION = "data.contradiction"  # code of the finding on a log that contradicts itself
 LOST = "the recorder: data were lost"
 
 
@@ -77,6 +78,8 @@ def _advice(results: FlightResults, chapters: Chapters) -> Iterator[Advice]:
         for part, (line, text) in remedies:
             if part in one.reason:
                 yield Advice(line, text, purpose)
+    for topic in dict.fromkeys(one.topic for one in results.findings if one.code == CONTRADICTION):
+        yield Advice("Check", f"signs, units and axes of {topic}: they contradict each other, a profile turns them", "")
     yield from (advice for advice in given if not advice.is_pressing)
     if results.status != "ok":
         yield Advice("Check", LOST, "")
