@@ -21,6 +21,7 @@ from groundstation.pipeline.verbs.usable import (
     usability_of_flight,
     usability_of_session,
 )
+from groundstation.systems import systems
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.gates_answer import GATES
 from groundstation.systems.heading.wording import told
@@ -61,8 +62,9 @@ def agreeing(purpose: str, flight: Flight) -> tuple[Usability, object]:
 
 def test_the_page_and_a_wrong_name_tell_every_purpose() -> None:
     purposes = [*FLIGHT_PURPOSES, *SESSION_PURPOSES]
+    assert {one.name for one in (*systems().analyses, *systems().session_analyses)} == set(purposes), "as list names"
     page = Path(__file__).parents[1] / "docs" / "integrity.md"
-    assert f"`--for {'|'.join(purposes)}`" in page.read_text(encoding="utf-8")
+    assert "`--for NAME`" in page.read_text(encoding="utf-8")
     refused = CliRunner().invoke(app, ["check", str(SAMPLES / "taxi-short.csv"), "--for", "taxi"])
     assert refused.exit_code != 0
     assert f"one of {', '.join(purposes)}" in refused.output
@@ -176,10 +178,25 @@ def test_an_mcap_is_told_as_its_log_is(tmp_path: Path) -> None:
     assert told_of[0]["lacking"]
 
 
+def test_every_analysis_that_list_names_is_told_as_it_runs() -> None:
+    """Those that examine nothing are run: yes exactly where they answer, else the reason that the run gives."""
+    flight = read(SAMPLES / "taxi-good.csv")
+    seen = seen_by_analyses(flight, ORDINARY)
+    every = tuple(one for one in systems().analyses if not one.judges)
+    ran = run_analyses(every, seen, known_of(seen, ORDINARY))
+    for analysis in every:
+        told_of = usability_of_flight(analysis.name, flight, ORDINARY)
+        assert (told_of.state == "no") == (analysis.name not in ran.answers), analysis.name
+        if analysis.name in ran.reasons and analysis.examine is None:
+            assert told_of.shortfalls[0].text == ran.reasons[analysis.name]
+    assert usability_of_flight("latency", flight, ORDINARY).state != "no"
+    assert "no truth" in usability_of_flight("reference", seen, ORDINARY).text
+
+
 def test_a_purpose_that_is_none_is_a_usage_error() -> None:
     code, _, error = groundstation("check", SAMPLES / "taxi-good.csv", "--for", "cooking")
     assert code == 2
-    assert "heading, inertial, trajectory, magnetic, magnetic_flux, landing, health, gnss, cooperative" in error
+    assert ", ".join((*FLIGHT_PURPOSES, *SESSION_PURPOSES)) in error
 
 
 def test_a_recorded_flight_is_told_as_it_runs() -> None:

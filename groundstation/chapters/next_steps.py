@@ -31,6 +31,7 @@ BY_REASON_OF_AN_INS: Remedies = (
     ("no INS position", ("Record", "INS position")),
     ("no INS heading", ("Record", "INS heading")),
 )
+CONTRADICTION = "data.contradiction"  # code of the finding on a log that contradicts itself
 LOST = "the recorder: data were lost"
 UNNAMED = "the buses with an ICD (`run --icd FILE`; `info --suggest-icd` drafts one)"
 CUT = "that the log was copied whole: its end is cut off"
@@ -86,6 +87,8 @@ def _advice(results: FlightResults, chapters: Chapters) -> Iterator[Advice]:
         for part, (line, text) in remedies:
             if part in one.reason:
                 yield Advice(line, text, purpose)
+    for topic in dict.fromkeys(one.topic for one in results.findings if one.code == CONTRADICTION):
+        yield Advice("Check", f"signs, units and axes of {topic}: they contradict each other, a profile turns them", "")
     yield from (advice for advice in given if not advice.is_pressing)
     if results.status != "ok" and not results.ledger.is_in_midst:
         yield Advice("Check", CUT if results.ledger.loss == END_CUT else LOST, "")

@@ -243,7 +243,10 @@ def _climb(one: _Series, zero_ns: int) -> Contradiction | None:
     found = climb_agreement(known.time_s, known.columns[name], known.columns[DOWN])
     if found is None or found >= OPPOSITE:
         return None
-    text = f"{DOWN} of {one.topic} goes up with its height (correlation with its rate of sinking {found:.2f})"
+    text = (
+        f"{DOWN} of {one.topic} goes up with its height (correlation with its rate of sinking {found:.2f}): climb and "
+        "sink rate by it have the wrong sign"
+    )
     start_ns = zero_ns + round(float(known.time_s[0]) * NS_PER_S)
     return Contradiction(one.topic, text, start_ns, float(known.time_s[-1] - known.time_s[0]))
 

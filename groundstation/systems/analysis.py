@@ -159,8 +159,8 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     check : callable
         ``check(settings, aircraft)`` raises SettingsError for settings that contradict what is known of the aircraft.
     examine : callable, optional
-        ``examine(data, known, settings)``: what the data lack, by the same selection of data as ``run`` makes; an
-        analysis that has it is a purpose of ``check --for``.
+        ``examine(data, known, settings)``: what the data lack, by the same selection of data as ``run`` makes, for
+        ``check --for``; an analysis of a flight without it is run there.
     gives : callable
         ``gives(data, known, settings)``: what such data give beside the answer itself, a line each for ``check --for``.
     rules : Rules, optional

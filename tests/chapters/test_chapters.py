@@ -468,3 +468,11 @@ def test_overview_stands_where_there_is_something_to_draw() -> None:
     ]
     answer = example(heading_result()).answer(HeadingResult)
     assert answer is not None and overview(example(answer, figures=answer.figures)) is None
+
+
+def test_what_a_log_contradicts_itself_in_is_advised_once() -> None:
+    found = [Finding("warn", "data.contradiction", "this log contradicts itself: ...", "ins") for _ in range(2)]
+    section = next_steps(example(None, findings=tuple(found), not_assessable=()))
+    assert section is not None and isinstance(section.parts[0], Facts)
+    (text,) = (text for line, text, _ in section.parts[0].pairs if line == "Check")
+    assert str(text).count("igns, units and axes of ins") == 1

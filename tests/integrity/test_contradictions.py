@@ -155,6 +155,7 @@ def test_the_vertical_velocity_of_the_reference_drive_is_upward() -> None:
     found = ledger_findings(survey(read(real_log("reference_heading/pntos_drive_first_half.csv"))).ledger)
     (text,) = [finding.text for finding in found if finding.code == CONTRADICTION]
     assert "velocity_down_mps of ins goes up with its height (correlation with its rate of sinking -1.00)" in text
+    assert "climb and sink rate by it have the wrong sign" in text
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

@@ -1,21 +1,21 @@
 """Usability of logs for a named purpose: what an analysis would lack.
 
-Told without running the analysis.
+Told without running the analysis where it can examine the data; else it is run, with those that it needs.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 from groundstation.base.errors import NotAssessableError, SettingsError, UsageError
 from groundstation.base.findings import Finding
 from groundstation.base.signals import topics_of_kind
-from groundstation.pipeline.one_flight.analyse import known_of, seen_by_analyses
+from groundstation.pipeline.one_flight.analyse import known_of, run_analyses, seen_by_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.systems import systems
 from groundstation.systems.analysis import Analysis, Shortfall
-from groundstation.systems.known import SessionKnown
+from groundstation.systems.known import Known, SessionKnown
 from groundstation.tables.table import Flight
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 LISTED = 3  # spans listed for a shortfall
 
-FLIGHT_PURPOSES: Mapping[str, Analysis] = MappingProxyType({one.name: one for one in systems().analyses if one.examine})
+FLIGHT_PURPOSES: Mapping[str, Analysis] = MappingProxyType({one.name: one for one in systems().analyses})
 SESSION_PURPOSES: Mapping[str, Analysis] = MappingProxyType(
     {one.name: one for one in systems().session_analyses if one.examine}
 )
@@ -93,8 +93,35 @@ def require_purpose(name: str) -> None:
 
 def usability_of_flight(purpose: str, flight: Flight, configuration: Configuration) -> Usability:
     """Tell whether a flight serves an analysis of flights."""
+    analysis = FLIGHT_PURPOSES[purpose]
     seen = seen_by_analyses(flight, configuration)
-    return _examined(FLIGHT_PURPOSES[purpose], seen, known_of(seen, configuration))
+    known = known_of(seen, configuration)
+    if analysis.examine is not None:
+        return _examined(analysis, seen, known)
+    return _run(analysis, flight if analysis.judges else seen, seen, known)
+
+
+def _run(analysis: Analysis, data: Flight, seen: Flight, known: Known) -> Usability:
+    """Run an analysis that examines nothing, after those that it needs, and tell whether it answers."""
+    before = run_analyses(tuple(one for one in _needed(analysis) if not one.judges), seen, known)
+    found = run_analyses((analysis,), data, replace(known, answers=before.answers, workings=before.workings))
+    gives = analysis.gives(data, known, known.settings[analysis.settings_table])
+    if analysis.name in found.answers:
+        return Usability(analysis.name, "yes", (), gives)
+    missing = (before.reasons[name] for name in analysis.requires if name in before.reasons)
+    reason = next(missing, found.reasons.get(analysis.name, f"it is not for such a log; needs: {analysis.needs}"))
+    return Usability(analysis.name, "no", (Shortfall(reason),), gives)
+
+
+def _needed(analysis: Analysis) -> tuple[Analysis, ...]:
+    """Return the analyses that one builds on, and that these build on."""
+    wanted, waiting = set[str](), [*analysis.builds_on, *analysis.requires]
+    while waiting:
+        name = waiting.pop()
+        if name in FLIGHT_PURPOSES and name not in wanted:
+            wanted.add(name)
+            waiting += [*FLIGHT_PURPOSES[name].builds_on, *FLIGHT_PURPOSES[name].requires]
+    return tuple(one for one in FLIGHT_PURPOSES.values() if one.name in wanted)
 
 
 def usability_of_session(

@@ -1,5 +1,6 @@
 """Chapter on the GNSS reception of a flight."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -181,7 +182,7 @@ def _length(value: float | None) -> str:
 def _behind_ins(one: GnssReceiver) -> str:
     if one.behind_ins_s is None:
         return "not observed"
-    return f"{number(one.behind_ins_s, 3, 's', signed=True)} ± {number(one.behind_ins_sigma_s, 3, 's')}"
+    return f"{number(one.behind_ins_s, 3, 's', signed=True)} (σ {number(one.behind_ins_sigma_s, 3, 's')})"
 
 
 QUALITY: tuple[tuple[str, Callable[[GnssReceiver], str]], ...] = (
@@ -279,6 +280,23 @@ def _edges(one: GnssReceiver, every: tuple[StandstillScatter, ...], answer: Gnss
     return told
 
 
+def _position_behind_ins(one: GnssReceiver) -> str:
+    """Return what the delays of the velocity, behind the INS and the position, make of the position's.
+
+    Empty where one of them is not known.
+    """
+    lag_s = None if one.motion is None else one.motion.lag_s
+    if one.motion is None or lag_s is None or one.behind_ins_s is None:
+        return ""
+    behind_s = one.behind_ins_s - lag_s
+    sigma_s = math.hypot(one.behind_ins_sigma_s or 0.0, one.motion.lag_sigma_s or 0.0)
+    velocity = number(one.behind_ins_s, 3, "s", signed=True)
+    return (
+        f"The velocity is later than the INS by {velocity}, so the position is later than the INS by "
+        f"{number(behind_s, 3, 's', signed=True)} (σ {number(sigma_s, 3, 's')})."
+    )
+
+
 def _motion(one: GnssReceiver, answer: GnssReception) -> list[Part | None]:
     motion = one.motion
     if motion is None:
@@ -293,7 +311,7 @@ def _motion(one: GnssReceiver, answer: GnssReception) -> list[Part | None]:
     ]
     if motion.lag_s is not None:
         spread = number(motion.lag_sigma_s, 3, "s")
-        pairs.append(("Velocity later than position by", number(motion.lag_s, 3, "s", signed=True), f"± {spread}"))
+        pairs.append(("Velocity later than position by", number(motion.lag_s, 3, "s", signed=True), f"σ {spread}"))
         pairs.append(("Left without that delay, RMS", number(motion.left_rms_mps, 3, "m/s"), ""))
     if motion.lasting_rms_mps is not None:
         pairs.append(
@@ -301,7 +319,7 @@ def _motion(one: GnssReceiver, answer: GnssReception) -> list[Part | None]:
         )
     too_sure = float(answer.settings.get("too_sure", 2.0))
     meaning = meaning_of(motion, too_sure)
-    text = with_full_stop(capitalised(meaning))
+    text = " ".join(filter(None, (with_full_stop(capitalised(meaning)), _position_behind_ins(one))))
     return [Facts(f"Velocity against position{_of(one, answer)}", pairs, text), Figure("gnss.steps", of=one.topic)]
 
 
@@ -394,6 +412,6 @@ def _pair(pair: ReceiverPair) -> Facts:
     add("Antenna forward", pair.forward_m, number(pair.forward_m, 2, "m", signed=True), "by the track")
     add("Antenna right", pair.right_m, number(pair.right_m, 2, "m", signed=True), "by the track")
     lag_text = number(pair.lag_s, 3, "s", signed=True)
-    add("Later by", pair.lag_s, lag_text, f"± {number(pair.lag_sigma_s, 3, 's')}")
+    add("Later by", pair.lag_s, lag_text, f"σ {number(pair.lag_sigma_s, 3, 's')}")
     text = f"Both with a fix for {seconds_text(pair.seconds)}."
     return Facts(f"{pair.second} from {pair.first}", pairs, text)

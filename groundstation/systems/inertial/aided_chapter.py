@@ -10,6 +10,7 @@ from groundstation.results.answer import Answers
 from groundstation.systems.inertial.answer import Departure, Difference, InertialResult, OwnInnovation
 from groundstation.systems.inertial.judged_answer import JudgedFilter, judged_filter
 
+OF_EPOCHS = "95 % of the epochs"
 TITLE = "INS against GNSS"
 HEADLINES = {"gnss_aided": "GNSS corrects this INS", "unknown": "It is not known whether GNSS corrects this INS"}
 LEAD = "INS − GNSS shows how closely this INS follows its receiver, not how good either of them is."
@@ -43,14 +44,18 @@ def aided(answer: InertialResult, answers: Answers) -> Section:
 def _claim(answer: InertialResult, headline: str, judged: JudgedFilter | None) -> Claim:
     rows = [row for row in (answer.difference("position"), answer.difference("velocity")) if row is not None]
     figures = tuple(
-        (f"INS − GNSS, {row.quantity}", number(row.p95, PLACES.get(row.unit, 3) - 1, unit_sign(row.unit)), "95 %")
+        (
+            f"INS − GNSS, {row.quantity}",
+            number(row.p95, PLACES.get(row.unit, 3) - 1, unit_sign(row.unit)),
+            OF_EPOCHS,
+        )
         for row in rows
     )
     reason = typeset(answer.kind_reason).strip().rstrip(".")
     sentences = (f"{capitalised(reason)}.",) if reason else ()
     value = figures[0][1] if figures else ""
     unseen = "its own drift cannot be seen" if judged is None else f"its errors are judged {judged.by}"
-    remark = f"INS − GNSS, 95 %; {unseen}" if figures else unseen
+    remark = f"INS − GNSS, {OF_EPOCHS}; {unseen}" if figures else unseen
     left = answer.worst_departure
     if left is not None:
         return _claim_on(answer, left, headline)
@@ -157,7 +162,7 @@ def _why(answer: InertialResult, *, is_judged: bool) -> Note:
 
 def _differences(rows: tuple[Difference, ...]) -> Grid | None:
     heads = (Head("INS − GNSS"), *(Head(title, True) for title in ("Mean", "Median", "95 %", "Largest", "Epochs")))
-    caption = "Mean with its sign; median, 95 % and largest of the magnitude."
+    caption = "Mean with its sign; median, 95 % and largest of the magnitude, epoch by epoch."
     cells = [(_title(row), *_sizes(row), _of(row, row.largest), number(row.samples, 0)) for row in rows]
     return Grid("INS − GNSS", heads, cells, caption, ("inertial_differences",)) if cells else None
 

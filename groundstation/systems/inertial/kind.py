@@ -61,7 +61,7 @@ def kind_of(
     seconds = float(np.ptp(epochs.time_s[known]))
     if largest < min(settings.aided_radial_m, DRIFT_MPS * seconds):
         return AIDED, (
-            f"it stays within {largest:.1f} m of GNSS for {seconds / MINUTE_S:.0f} min (95 % of the minute means), "
-            "as no unaided INS does"
+            f"it stays within {largest:.1f} m of GNSS for {seconds / MINUTE_S:.0f} min (95 % of the minute means "
+            "about their median), as no unaided INS does"
         )
     return UNAIDED, f"it drifts from GNSS: minute means spread over {largest:.0f} m (95 %)"

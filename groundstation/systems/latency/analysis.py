@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from groundstation.base.findings import Finding
 from groundstation.methods.lag.settings import LatencySettings
 from groundstation.results.roles import KindOfIns
-from groundstation.systems.analysis import Analysis, Found
+from groundstation.systems.analysis import Analysis, Found, Shortfall
 from groundstation.systems.known import Known
 from groundstation.systems.latency.answer import Latencies
 
@@ -21,6 +21,14 @@ def _run(flight: "Flight", known: Known, settings: LatencySettings) -> Found[Lat
     known_ins = known.answer_meeting(KindOfIns)
     found = estimate_latencies(flight, settings=settings, kinds=known_ins.kinds if known_ins else {})
     return Found(found, _findings(found))
+
+
+def _examine(flight: "Flight", known: Known, settings: LatencySettings) -> tuple[Shortfall, ...]:
+    """Return the sensors whose latency the motion does not show; the estimate itself is short."""
+    rows = _run(flight, known, settings).answer.rows
+    return tuple(
+        Shortfall(f"{row.quantity} of {row.other}: {row.reason}") for row in rows if row.state == "not_observable"
+    )
 
 
 def _findings(found: Latencies) -> tuple[Finding, ...]:
@@ -56,4 +64,5 @@ LATENCY = Analysis(
     run=_run,
     builds_on=("inertial",),
     is_expected=_is_expected,
+    examine=_examine,
 )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from groundstation.chapters.markdown import markdown
-from groundstation.chapters.parts import Note
+from groundstation.chapters.parts import Facts, Note
 from groundstation.pipeline.api import open_flight
 from groundstation.results.flight import FlightResults
 from groundstation.systems.gnss.analysis import GNSS
@@ -79,6 +79,21 @@ def test_shares_after_the_first_fix_are_never_more_than_all() -> None:
 def test_a_chapter_of_nothing_known_is_not_judged() -> None:
     section = gnss(results_of(table(times(), fix=None, satellites_used=None, hdop=None)))
     assert section is not None and section.claim is not None and section.claim.mark.tone == "unknown"
+
+
+@pytest.mark.real_log
+def test_delays_of_the_velocity_are_told_as_that_of_the_position_too() -> None:
+    """Velocity 0.280 s behind the INS and 0.199 s behind the position: the position 0.081 s behind the INS."""
+    results = open_flight(real_log("reference_heading/pntos_drive_first_half.csv")).results
+    section = gnss(results)
+    assert section is not None
+    (facts,) = (
+        part for part in section.parts if isinstance(part, Facts) and part.title.startswith("Velocity against pos")
+    )
+    text = facts.caption.replace("\N{NARROW NO-BREAK SPACE}", " ")
+    assert "so the position is later than the INS by +0.081 s (σ 0.03" in text
+    (lag,) = (remark for label, _, remark in facts.pairs if label == "Velocity later than position by")
+    assert lag.startswith("σ "), "one sigma is not a 95 % interval"
 
 
 def test_every_figure_has_its_plot() -> None:
