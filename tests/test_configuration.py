@@ -91,6 +91,9 @@ def test_metar_lines_of_a_file_and_of_the_settings(tmp_path: Path) -> None:
     file.write_text("sunny\n", encoding="utf-8")
     with pytest.raises(SettingsError, match=r"metar\.txt: found no METAR line with a wind, expected lines such as"):
         load_configuration(weather=file)
+    file.write_bytes(b"")
+    with pytest.raises(SettingsError, match=r"metar\.txt: found no METAR line with a wind, expected lines such as"):
+        load_configuration(weather=file)
     file.write_bytes(b"METAR UUEE 040600Z 27010MPS CAVOK=\n# \xff\xfe\n")
     with pytest.raises(
         SettingsError, match=r"metar\.txt: found text that is not UTF-8 \(byte 38: 0xff\), expected a text"

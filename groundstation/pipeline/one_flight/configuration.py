@@ -418,7 +418,7 @@ def _weather(listed: Any, given: Settings | None, where: str) -> tuple[str, ...]
         listed = given.get("weather", [])
     if not isinstance(listed, list) or not all(isinstance(line, str) for line in listed):
         raise SettingsError(f"{where}, weather", repr(listed), "a list of METAR lines")
-    if not listed:
+    if file is None and not listed:
         return ()
     from groundstation.base.metar import metar_wind
 
