@@ -13,11 +13,13 @@ from groundstation.base.serial import MismatchError, from_json
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.columns import AnswerColumn
 from groundstation.results.figures import FigureData
+from groundstation.results.roles import StatesAlongTheFlight
 from groundstation.systems.analysis import Analysis, Found
 from groundstation.systems.known import Known
 from groundstation.systems.several_logs.answer import ChosenSource, JoinedLog, Joining, MotionAgreement, Together
 from groundstation.systems.several_logs.arrays import JoinedDifference, JoinedMotion
 from groundstation.systems.several_logs.channels import UNITS, side_of
+from groundstation.systems.several_logs.seen_answer import seen_by_motion
 from groundstation.systems.several_logs.settings import TwoClocksSettings
 from groundstation.tables.sources import TOGETHER, is_joined, ranked, why_first
 
@@ -29,9 +31,10 @@ GAP_S = 2.5
 SPEED = ("north", "east")
 SUFFIX = {"m/s": "mps", "deg": "deg", "deg/s": "dps", "m": "m"}
 CHOSEN_KINDS = ("ins", "gnss")
+NOT_KNOWN = "how well the clocks agree is not known"
 
 
-def _run(flight: "Flight", _known: Known, settings: TwoClocksSettings) -> Found[Together]:
+def _run(flight: "Flight", known: Known, settings: TwoClocksSettings) -> Found[Together]:
     try:
         joining = from_json(Joining, json.loads(flight.metadata[TOGETHER]))
     except (ValueError, MismatchError) as error:
@@ -45,10 +48,16 @@ def _run(flight: "Flight", _known: Known, settings: TwoClocksSettings) -> Found[
             figures += shown[1]
     sources = tuple(_chosen(flight, kind) for kind in CHOSEN_KINDS if len(ranked(flight, kind)) > 1)
     answer = Together(joining.logs, sources, tuple(agreement), asdict(settings), tuple(figures))
-    findings = (
+    findings = [
         Finding("info", "together.source", f"{one.kind.upper()}: {one.topic} is used: {one.why}", one.topic)
         for one in sources
-    )
+    ]
+    if seen_by_motion(joining.logs, known.answer_meeting(StatesAlongTheFlight)) is None:
+        findings += [
+            Finding("warn", "together.file_time", f"the times of the files alone place {one.source_name}: {NOT_KNOWN}")
+            for one in joining.logs
+            if one.method == "file_time"
+        ]
     return Found(answer, tuple(findings))
 
 
@@ -129,6 +138,7 @@ TOGETHER_ANALYSIS = Analysis(
     title="several logs of one flight on one clock: offset, drift, agreement, sources used",
     subject="joining of logs",
     needs="several logs of one flight, run with --together",
+    builds_on=("trajectory",),
     settings=TwoClocksSettings,
     answer=Together,
     run=_run,

@@ -12,6 +12,7 @@ from groundstation.chapters.wording import number, plural, typeset
 from groundstation.results.flight import FlightResults
 from groundstation.results.roles import StatesAlongTheFlight
 from groundstation.systems.several_logs.answer import JoinedLog, JoinedStretch, JoinMethod, Together
+from groundstation.systems.several_logs.seen_answer import seen_by_motion
 
 TITLE = "Logs of this flight"
 LEAD = "How the clock of each log relates to that of the flight, and which of several sources the analyses use."
@@ -79,27 +80,17 @@ def _seen_by_motion(results: FlightResults, answer: Together) -> _Seen | None:
 
     None where it is another log, or several, that file time alone places, and where no trajectory shows it.
     """
-    found = results.answer_meeting(StatesAlongTheFlight)
-    latency = None if found is None or not found.is_reference else found.gnss_latency
-    unknown = [log for log in answer.logs if log.method == "file_time"]
-    if found is None or latency is None or len(unknown) != 1:
+    seen = seen_by_motion(answer.logs, results.answer_meeting(StatesAlongTheFlight))
+    if seen is None:
         return None
-    unit, gnss = (_log_of(answer, topic) for topic in (found.unit_topic, found.gnss_topic))
-    if unit is gnss or unknown[0] not in (unit, gnss):
-        return None
-    size = typeset(with_half(abs(latency[0]), NORMAL_95 * latency[1], "s"))
-    apart = f"{size} {'later' if latency[0] > 0.0 else 'earlier'}"
+    size = typeset(with_half(abs(seen.latency_s), NORMAL_95 * seen.sigma_s, "s"))
+    apart = f"{size} {'later' if seen.latency_s > 0.0 else 'earlier'}"
     text = (
-        f"By the motion that both show, GNSS times of {gnss.source_name} are {apart} than those of {unit.source_name} "
-        "(95 %), the receiver's delay included: it is the GNSS latency of the trajectory, which takes it off."
+        f"By the motion that both show, GNSS times of {seen.gnss.source_name} are {apart} than those of "
+        f"{seen.unit.source_name} (95 %), the receiver's delay included: it is the GNSS latency of the "
+        "trajectory, which takes it off."
     )
     return _Seen(apart, text)
-
-
-def _log_of(answer: Together, topic: str) -> JoinedLog:
-    """Return the log that a topic of the flight comes from."""
-    labelled = (log for log in answer.logs if log.label and topic.endswith(f".{log.label}"))
-    return next(labelled, next(log for log in answer.logs if not log.label))
 
 
 def _claim(answer: Together, seen: _Seen | None) -> Claim:

@@ -82,7 +82,7 @@ def _findings(joined: Sequence[JoinedLog]) -> Iterator[Finding]:
     for log in joined:
         if log.method == "own_clock":
             continue
-        yield Finding("warn" if log.method == "file_time" else "info", "together.joined", joined_text(log))
+        yield Finding("info", "together.joined", joined_text(log))
         for remark in log.remarks:
             yield Finding("warn", "together.remark", f"{log.source_name}: {remark}")
 

@@ -1,16 +1,25 @@
 """Logs joined by file time: how well their clocks agree is told where a trajectory over both shows it."""
 
+import json
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import pytest
 
+from groundstation.base.serial import to_json_exactly
 from groundstation.chapters.markdown import markdown
 from groundstation.results.answer import Answer
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.roles import StatesAlongTheFlight
-from groundstation.systems.several_logs.answer import JoinedLog, JoinedStretch, Together
+from groundstation.systems.known import Known
+from groundstation.systems.several_logs.analysis import TOGETHER_ANALYSIS
+from groundstation.systems.several_logs.answer import JoinedLog, JoinedStretch, Joining, Together
 from groundstation.systems.several_logs.chapter import together
+from groundstation.systems.several_logs.joined import _findings
+from groundstation.systems.several_logs.settings import TwoClocksSettings
+from groundstation.tables.phases import Phases
+from groundstation.tables.sources import TOGETHER
+from groundstation.tables.table import Flight
 
 UNKNOWN = "it is not known how well the clocks agree"
 
@@ -82,3 +91,19 @@ def test_a_third_log_by_file_time_stays_unknown() -> None:
     both = logs()
     other = replace(both.logs[0], label="c", source_name="c.csv")
     assert told(replace(both, logs=(*both.logs, other)), Track())[:2] == ("warn", UNKNOWN)
+
+
+def warned(track: Track | None) -> list[str]:
+    """Texts of the warnings that the analysis gives."""
+    flight = Flight({}, {TOGETHER: json.dumps(to_json_exactly(Joining(logs().logs)))})
+    answers: dict[str, Answer] = {} if track is None else {"track": track}
+    found = TOGETHER_ANALYSIS.run(flight, Known(Phases((), "none"), answers=answers), TwoClocksSettings())
+    return [one.text for one in found.findings if one.severity == "warn"]
+
+
+def test_file_time_is_warned_of_only_where_the_motion_does_not_show_the_clocks() -> None:
+    """The finding of the joining warned also of logs whose latency the trajectory told and took off."""
+    assert warned(Track()) == []
+    (text,) = warned(None)
+    assert text == "the times of the files alone place imu.csv: how well the clocks agree is not known"
+    assert [one.severity for one in _findings(logs().logs)] == ["info"]
