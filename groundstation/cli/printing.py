@@ -6,7 +6,7 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 from groundstation.base.text_columns import columns
-from groundstation.base.words import IN_MS_BELOW_S
+from groundstation.base.words import IN_MS_BELOW_S, counted
 from groundstation.cli.lines import Lines
 from groundstation.cli.text import as_json, printable, say, tell
 from groundstation.pipeline.one_flight.outcome import Outcome, State, worst_code
@@ -169,8 +169,8 @@ def _counted(noun: str, done: Sequence[Outcome], states: Sequence[State]) -> str
     several = len(set(power_ups))
     count = len(done) - len(power_ups) + several
     which = "" if count == 1 else f", {several} of them"
-    told = f"{which} with {len(power_ups)} power-ups" if several else ""
-    return f"{count} {noun}{'' if count == 1 else 's'}{told}: {counts}{more}"
+    told = f"{which} with {counted(len(power_ups), 'power-up')}" if several else ""
+    return f"{counted(count, noun)}{told}: {counts}{more}"
 
 
 MOST_SKIPPED = 5  # named in a line

@@ -277,9 +277,10 @@ class TableReader:
             text = f"{target}: {counted(count, 'value')} outside [0, 360) brought into it by whole turns"
             yield Remark("wrapped_heading", text, target.rpartition(".")[0])
         if self.zoneless:
-            yield Remark("assumed_utc", f"{self.zoneless} times without a zone are read as UTC")
+            yield Remark("assumed_utc", f"{counted(self.zoneless, 'time')} without a zone: read as UTC")
         if late := self._days.weeks.rows:
-            text = f"{late} rows have the week before theirs: their seconds began anew, and the week did not"
+            rows = counted(late, "row has", "rows have")
+            text = f"{rows} the week before theirs: their seconds began anew, and the week did not"
             yield Remark("late_week", text)
         if any(layout.decimal_comma for layout in layouts):
             yield Remark("decimal_comma", "numbers are written with a decimal comma")

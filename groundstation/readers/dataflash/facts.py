@@ -9,6 +9,7 @@ from groundstation.base.signals import RAW_PREFIX
 from groundstation.base.source_units import PREFIX
 from groundstation.base.timescales import gps_week_to_utc_ns, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
+from groundstation.base.words import counted
 from groundstation.readers.dataflash.overview import DataflashOverview, GpsTimes
 from groundstation.readers.rollover import Earliest, rollovers
 from groundstation.readers.start import zero_of_readings
@@ -102,13 +103,13 @@ def utc_of_power_up(times: GpsTimes, firmware: str = "") -> tuple[int | None, li
     found = rollovers(moment_ns, earliest=_earliest(firmware))
     utc_ns = told.ns + found.shift_ns(moment_ns, is_gps_time=True)
     text = (
-        f"UTC from GPS week and time of {len(told.zeros_ns)} fixes less leap seconds: power-up at "
+        f"UTC from GPS week and time of {counted(len(told.zeros_ns), 'fix', 'fixes')} less leap seconds: power-up at "
         f"{utc_ns_to_iso(utc_ns)}; late by the receiver's delay, some 0.1 to 0.2 s"
     )
     remarks = [Remark("utc_from_gps", text), *told.remarks("GPS time"), *found.remarks]
     unknown = int((times.week == 0).sum())
     if unknown:
-        text = f"GPS time: {unknown} fixes told week 0: the week was not known yet"
+        text = f"GPS time: {counted(unknown, 'fix', 'fixes')} told week 0: the week was not known yet"
         remarks.append(Remark("week_number", text))
     return utc_ns, remarks if told.passed_over else [*remarks, *_disagreement(zeros, device_ns)]
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from groundstation.base.records import Remark
 from groundstation.base.timescales import ROLLOVER_NS, iso_to_utc_ns, leap_seconds_at, utc_ns_to_iso
+from groundstation.base.words import counted
 from groundstation.readers.receiver.times import DAY_NS, Anchors, late_stretches, moved_on, on_one_date
 from groundstation.readers.rollover import Earliest, OtherDate, rollovers
 
@@ -118,7 +119,8 @@ def _of_another_date(name: str, others: tuple[tuple[int, int], ...]) -> Iterator
 def _wrong_leaps(wrong_leaps: Mapping[int, int]) -> Iterator[Remark]:
     for wrong_s, count in sorted(wrong_leaps.items()):
         text = (
-            f"{count} fixes told UTC {abs(wrong_s)} s {'late' if wrong_s > 0 else 'early'}, as a receiver does before "
+            f"{counted(count, 'fix', 'fixes')} told UTC {abs(wrong_s)} s {'late' if wrong_s > 0 else 'early'}, "
+            "as a receiver does before "
             "its first almanac: their times are GPS time less the leap seconds of the day"
         )
         yield Remark("leap_seconds", text)

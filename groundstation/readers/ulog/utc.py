@@ -9,6 +9,7 @@ from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Int64Array, Remark
 from groundstation.base.timescales import GPS_EPOCH_NS, iso_to_utc_ns, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
+from groundstation.base.words import counted
 from groundstation.readers.rollover import Earliest, OtherDate, rollovers
 from groundstation.readers.start import ToldZero, told_at_zero
 from groundstation.readers.ulog.blocks import Topic, UlogBlock
@@ -108,8 +109,8 @@ class UtcCollector:
         zeros |= {} if own is None else {own.name: own.zero_ns}
         others = tuple(OtherDate(other, moment_ns + (zero_ns - found.ns)) for other, zero_ns in zeros.items())
         text = (
-            f"UTC of power-up from {name}: median over {len(found.zeros_ns)} times with a fix, nine tenths within "
-            f"{found.spread_s:.3f} s; messages come some 0.1 s after the time they tell"
+            f"UTC of power-up from {name}: median over {counted(len(found.zeros_ns), 'time')} with a fix, nine tenths "
+            f"within {found.spread_s:.3f} s; messages come some 0.1 s after the time they tell"
         )
         remarks = (Remark("utc_from_gnss", text), *found.remarks(name))
         start = _dated(found.ns, moment_ns, remarks, release, others)

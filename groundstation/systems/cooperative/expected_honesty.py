@@ -21,6 +21,7 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.findings import Finding
 from groundstation.base.records import frozen
+from groundstation.base.words import counted
 from groundstation.systems.cooperative.answer import AlgorithmRow
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.filters.pairwise import after_over_before
@@ -206,9 +207,9 @@ def _density(prepared: Prepared) -> str:
     minutes = max(end_s - start_s, 1.0) / 60.0
     each = int(is_peer.sum()) / max(pairs, 1) / minutes
     loops = max(pairs - len(prepared.vehicles) + 1, 0)
-    text = f"{each:.3g} encounters a minute of each of {pairs} pairs ({loops} loop{'' if loops == 1 else 's'})"
+    text = f"{each:.3g} encounters a minute of each of {counted(pairs, 'pair')} ({counted(loops, 'loop')})"
     others = int((~is_peer).sum())
-    return f"{text} and {others} ranges to points or satellites" if others else text
+    return f"{text} and {counted(others, 'range')} to points or satellites" if others else text
 
 
 def refusals(checks: Mapping[str, HonestyCheck]) -> list[Finding]:

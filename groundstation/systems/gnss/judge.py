@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.findings import Finding, Severity
+from groundstation.base.words import counted
 from groundstation.systems.gnss.answer import (
     WITHOUT_FIX,
     WITHOUT_RECORD,
@@ -70,7 +71,8 @@ def _fix(one: GnssReceiver, settings: GnssSettings) -> list[Judged]:
         found.append(Judged("warn", f"first fix after {seconds_text(waited_s)}", "late_first_fix", one.topic))
     found += [*_lost(one, settings), *_silent(one, settings)]
     if one.placeless_rows:
-        text = f"{one.placeless_rows} rows claim a fix without a place and a velocity: counted as no fix"
+        count = counted(one.placeless_rows, "row claims", "rows claim")
+        text = f"{count} a fix without a place and a velocity: counted as no fix"
         found.append(Judged("warn", text, "no_place", one.topic, count=one.placeless_rows))
     doubted = one.share("integrity_lost")
     if doubted > settings.geometry_share_warn:

@@ -29,7 +29,10 @@ def _rms_m(forecast: ForecastResult, horizon_min: float) -> float | None:
 
 
 def _p95_m(forecast: ForecastResult, method: str, horizon_min: float) -> float | None:
-    """Radial error of a method that 95 % of the starts stay below; None where it was not replayed."""
+    """Return the radial error that 95 % of the starts of a method stay below.
+
+    None where it was not replayed.
+    """
     return next((row.p95_m for row in forecast.skill if (row.method, row.horizon_min) == (method, horizon_min)), None)
 
 

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.signals import topics_of_kind
+from groundstation.base.words import counted
 from groundstation.methods.roles import HeadingOnGround
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.roles import AzimuthByTurns, Delays, HeadingByTrack, KindOfIns, StatesAlongTheFlight
@@ -89,7 +90,7 @@ def _run_on_ground(flight: "Flight", known: Known, settings: MagneticGroundSetti
 def _ground_text(found: GroundDeviation) -> str:
     errors = [run.error_deg for run in found.used if run.error_deg is not None]
     spanned = " to ".join(f"{round(error, 1) + 0.0:+.1f}" for error in sorted({min(errors), max(errors)}))
-    runs = f"{_count(len(errors), 'straight ground run')} in {_count(found.directions, 'direction')}"
+    runs = f"{counted(len(errors), 'straight ground run')} in {counted(found.directions, 'direction')}"
     return f"heading sensor on {runs}: error {spanned} deg"
 
 
@@ -105,10 +106,6 @@ def _too_wrong(found: GroundDeviation, settings: MagneticGroundSettings) -> tupl
         f"{run.start_s:.0f} s (sigma {sigma:.1f}), more than {settings.error_max_deg:g} deg"
     )
     return (Finding("warn", "magnetic_ground.error", text, found.ins_topic),)
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'s' * (number != 1)}"
 
 
 def _has_magnetic_heading(flight: "Flight", _known: Known) -> bool:
@@ -160,7 +157,7 @@ def _flux_sentence(answers: Answers) -> str:
     if found is None:
         return ""
     given = [row.letter for row in found.coefficients if row.value_deg is not None]
-    legs = _count(len(found.used), "straight leg")
+    legs = counted(len(found.used), "straight leg")
     text = f"flux valve {found.verdict}: {', '.join(given) or 'no coefficient'} of A to E by {legs}"
     residual = found.residual_rms_deg
     return text if residual is None else f"{text}, {residual.before:.2f} deg RMS before, {residual.after:.2f} after"

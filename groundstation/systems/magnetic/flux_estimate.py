@@ -8,7 +8,7 @@ import numpy as np
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import BoolArray
-from groundstation.base.words import listed
+from groundstation.base.words import counted, listed
 from groundstation.results.figures import FigureData
 from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.answer import Residual, SigmaPart
@@ -363,7 +363,7 @@ def _why_open(
         at = mean_heading(values.heading_deg[group])
         told.append(f"{float(wrap_180(error)):+.1f} +- {sigma:.1f} deg at {at:.0f} deg")
     missing = [row.letter for row in coefficients[:3] if row.state != "found"]
-    directions = f"{len(groups)} direction{'s' * (len(groups) != 1)}"
+    directions = counted(len(groups), "direction")
     gap = widest_gap_deg(values.heading_deg)
     shown = f"; error {', '.join(told)}" if told else ""
     return f"straight legs in {directions}, widest gap {gap:.0f} deg, do not show {listed(missing)}{shown}"

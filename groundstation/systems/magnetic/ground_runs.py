@@ -13,6 +13,7 @@ import numpy as np
 from groundstation.base.angles import FloatArray, mean_heading, unwrap, wrap_180, wrap_360
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.units import DEG_PER_RAD
+from groundstation.base.words import counted
 from groundstation.methods.moving_lines import fitted_lines, window_bounds
 from groundstation.methods.taxi.samples import OnGround, TaxiSamples, take_samples
 from groundstation.methods.taxi_error.interval import HeadingDifferences, Regressor, error_posterior
@@ -185,7 +186,7 @@ def _why_rejected(
     The track is looked at too: a heading that is stuck is no straight run.
     """
     if seconds < settings.run_min_s or samples < settings.samples_min:
-        return f"short: {seconds:.1f} s, {samples} epoch{'s' * (samples != 1)}"
+        return f"short: {seconds:.1f} s, {counted(samples, 'epoch')}"
     name, change = max(changes_deg.items(), key=lambda item: item[1])
     return f"curved: {name} changed by {change:.0f} deg" if change > settings.heading_change_max_deg else ""
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from groundstation.base.words import capitalised, with_half
+from groundstation.base.words import capitalised, counted, with_half
 from groundstation.chapters.parts import Claim, Mark, Rank
 from groundstation.chapters.wording import number_with_unit, significant, typeset, with_full_stop
 from groundstation.systems.trajectory.answer import BestTrajectory, TrajectoryState
@@ -116,7 +116,7 @@ def wrong_texts(answer: BestTrajectory) -> list[str]:
     for row in rows:
         if row.spans:
             more = len(row.spans) - 1
-            also = f"; {more} more span{'s' * (more > 1)}" if more else ""
+            also = f"; {counted(more, 'more span')}" if more else ""
             told.append(error_words(answer, row, row.spans[0]) + also)
         if row.changes:
             told.append(change_words(row))

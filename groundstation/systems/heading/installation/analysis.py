@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from groundstation.base.findings import Finding
 from groundstation.base.serial import from_json, to_json
+from groundstation.base.words import counted
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.installations import LearnedHeading
 from groundstation.systems.analysis import Analysis, Found
@@ -51,9 +52,7 @@ def sentence_of(found: LearnedHeading) -> str:
     if found.why_not:
         return f"nothing learned of the installation: {found.why_not}"
     half = found.half_width_deg * 60.0
-    text = (
-        f"installation of {found.ins_serial} from {found.flights} flight{'s' * (found.flights != 1)}: {found.verdict}"
-    )
+    text = f"installation of {found.ins_serial} from {counted(found.flights, 'flight')}: {found.verdict}"
     text += f", heading error {found.error_deg:+.3f} deg +-{half:.0f} arcmin"
     return text if found.correction_deg is None else f"{text}, enter {found.correction_deg:+g} deg"
 
