@@ -102,7 +102,10 @@ def usability_of_flight(purpose: str, flight: Flight, configuration: Configurati
 
 
 def _run(analysis: Analysis, data: Flight, seen: Flight, known: Known) -> Usability:
-    """Run an analysis that examines nothing, after those that it needs, and tell whether it answers."""
+    """Run an analysis that examines nothing, and tell whether it answers.
+
+    Those that it needs are run before it.
+    """
     before = run_analyses(tuple(one for one in _needed(analysis) if not one.judges), seen, known)
     found = run_analyses((analysis,), data, replace(known, answers=before.answers, workings=before.workings))
     gives = analysis.gives(data, known, known.settings[analysis.settings_table])

@@ -281,7 +281,7 @@ def _edges(one: GnssReceiver, every: tuple[StandstillScatter, ...], answer: Gnss
 
 
 def _position_behind_ins(one: GnssReceiver) -> str:
-    """Return what the delays of the velocity, behind the INS and the position, make of the position's.
+    """Return the delay of the position behind the INS, by both delays of the velocity.
 
     Empty where one of them is not known.
     """
