@@ -63,6 +63,10 @@ class Rates:
         >>> falling.dynamics.F.tolist(), falling.dynamics.after.tolist()
         ([[1.0, 2.0]], [[1.0, 1.0]])
         """
+        return self.with_noise(self.exponentials(values, seconds), seconds, density)
+
+    def exponentials(self, values: FloatArray, seconds: FloatArray) -> FloatArray:
+        """Return the entries of exp(A t) in the places of ``reach``, over each of k steps."""
         from groundstation.methods.kalman import series
 
         rows, columns = self.reach
@@ -70,8 +74,12 @@ class Rates:
         given, over = (frozen(np.ascontiguousarray(part, dtype=np.float64)) for part in (values, seconds))
         scratch = np.empty((2, self.size, self.size))
         series.exponentials(self.size, self.rows, self.columns, given, over, rows, columns, scratch, entries)
+        return entries
+
+    def with_noise(self, exponentials: FloatArray, seconds: FloatArray, density: FloatArray) -> Transition:
+        """Return the transition over steps whose exponentials are known."""
         noise, diagonal = 0.5 * np.outer(seconds, density), np.arange(self.size)
-        return Transition.sparse(self.size, rows, columns, entries, diagonal, diagonal, noise, noise)
+        return Transition.sparse(self.size, *self.reach, exponentials, diagonal, diagonal, noise, noise)
 
     def carried(self, values: FloatArray, step_s: float, every: int, start: FloatArray) -> FloatArray:
         """Carry a state forward in equal steps.

@@ -83,7 +83,7 @@ class Transition:
         order = np.lexsort((place[1], place[0]))
         changed, starts = np.unique(place[0][order], return_index=True)
         pattern = Pattern(changed, np.append(starts, len(order)).astype(np.int64), place[1][order])
-        ordered = np.ascontiguousarray(entries[:, order])
+        ordered = np.ascontiguousarray(entries if (np.diff(order) > 0).all() else entries[:, order])
         return cls(size, Dynamics(pattern, ordered, place[2], place[3], *added))
 
     @classmethod

@@ -118,14 +118,18 @@ def set_forecasts(
         ]
         seconds = float(start_s) - float(coarse.epochs.time_s[epoch])
         since = _values(differences, np.array([start_s - seconds, start_s]), flown) if seconds > 1e-6 else None
+        carriers: dict[float, FloatArray] = {}  # by the decay of the random drift, which several sets share
         for place, (run, densities) in enumerate(zip(runs, noises, strict=True)):
             x, P = _at_start(run, int(epoch), since, seconds, densities)
             x[PLACES], P[PLACES], P[:, PLACES] = known, 0.0, 0.0
+            beta = run.noise.beta_per_s
             for values in paths:
-                values[:, DECAYS] = -run.noise.beta_per_s
+                values[:, DECAYS] = -beta
+            if beta not in carriers:
+                carriers[beta] = RATES.exponentials(paths[1], np.full(len(paths[1]), VARIANCE_STEP_S))
             carried = RATES.carried(paths[0], STEP_S, round(LEAD_STEP_S / STEP_S), x)
             mean[place, start] = carried[:, PLACES] - known
-            variance[place, start] = _grown(run, paths[1], P, densities)
+            variance[place, start] = _grown(run, carriers[beta], P, densities)
     return SetForecasts(mean, variance)
 
 
@@ -151,13 +155,13 @@ def _at_start(
     return x, P
 
 
-def _grown(run: CoupledRun, values: FloatArray, P: FloatArray, densities: FloatArray) -> FloatArray:
-    """Return the variance of the position at the leads, shape (l, 2)."""
+def _grown(run: CoupledRun, exponentials: FloatArray, P: FloatArray, densities: FloatArray) -> FloatArray:
+    """Return the variance of the position at the leads, shape (l, 2), by the exponentials of the steps there."""
     nothing = np.zeros(0, np.int64)
     unseen = kalman.Measurements(nothing, np.zeros((0, 0)), nothing, lines_of(run.epochs, run.noise))
     carried = kalman.run_filter(
-        RATES.transition(values, np.full(len(values), VARIANCE_STEP_S), densities),
-        np.arange(len(values)),
+        RATES.with_noise(exponentials, np.full(len(exponentials), VARIANCE_STEP_S), densities),
+        np.arange(len(exponentials)),
         unseen,
         kalman.Start(np.zeros((SIZE, 0)), P),
         kept=kalman.KeptArrays(states=False, covariances=False, gains=False, variances=True),
