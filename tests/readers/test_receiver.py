@@ -142,7 +142,7 @@ def test_leap_seconds_of_a_receiver_without_an_almanac(tmp_path: Path) -> None:
     content = pvt("2026-05-04T12:00:02Z", itow=itow) + pvt("2026-05-04T12:00:01Z", itow=itow + 1000)
     read = Read(tmp_path, content)
     assert read.times("gnss") == ["2026-05-04T12:00:00.000000000Z", "2026-05-04T12:00:01.000000000Z"]
-    assert "1 fixes told UTC 2 s late" in read.remark("leap_seconds")
+    assert "1 fix told UTC 2 s late" in read.remark("leap_seconds")
 
 
 def test_the_week_rolls_over_between_two_messages(tmp_path: Path) -> None:
