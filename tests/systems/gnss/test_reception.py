@@ -103,6 +103,17 @@ def test_gaps_are_those_of_the_ledger_and_a_step_of_the_limit_is_none() -> None:
     assert (loss.start_s, loss.seconds) == pytest.approx((120.0, 0.8))  # from row to row
 
 
+@pytest.mark.parametrize("start_s", [0.0, 100.0])
+def test_a_gap_has_the_speed_and_the_way_from_its_own_row(start_s: float) -> None:
+    """Behind the first row too, at which the vehicle stands."""
+    time_s = times()
+    (loss,) = receiver(table(time_s[(time_s <= start_s + 0.1) | (time_s > start_s + 5.9)])).losses
+    place, velocity = motion(np.array([start_s, start_s + 6.0]))
+    assert (loss.start_s, loss.seconds) == pytest.approx((start_s, 6.0))
+    assert loss.speed_before_mps == pytest.approx(float(np.hypot(*velocity[0])))
+    assert loss.moved_m == pytest.approx(float(np.hypot(*(place[1] - place[0]))), rel=1e-4)
+
+
 def test_a_gap_that_others_share_but_for_a_row_late_is_the_logs() -> None:
     time_s = times()
     rows = table(time_s[(time_s < 100.0) | (time_s >= 103.0)])
@@ -399,6 +410,26 @@ def test_places_in_coarse_steps_differ_from_a_velocity_of_zero() -> None:
     one = receiver(table(time_s, place_m=far, **still))
     assert one.motion is not None and one.jumps_found == 2
     assert one.motion.difference_rms_mps == pytest.approx(0.04 * np.sqrt(0.2), rel=0.01), "without the jumps"
+
+
+def test_a_receiver_that_holds_its_place_still_jumps() -> None:
+    """Every step but one is of nothing."""
+    time_s = times(0.5)
+    still = {f"velocity_{axis}_mps": np.zeros(len(time_s)) for axis in ("north", "east")}
+    far = np.column_stack([300.0 * (time_s >= 90.0), np.zeros(len(time_s))])
+    one = receiver(table(time_s, place_m=far, **still))
+    assert one.jumps_found == 1 and one.jumps[0].size_m == pytest.approx(300.0, rel=1e-3)
+    assert one.motion is not None and one.motion.difference_rms_mps == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_place_that_is_seldom_another_step_is_no_jump_and_no_outlier() -> None:
+    """Fewer steps of 2 cm than jumps may be: they count in the difference all the same."""
+    time_s = times(0.5)
+    still = {f"velocity_{axis}_mps": np.zeros(len(time_s)) for axis in ("north", "east")}
+    moved = np.isin(np.arange(len(time_s)) % 40, (3, 4, 5))  # there and back nine times
+    one = receiver(table(time_s, place_m=np.column_stack([0.02 * moved, np.zeros(len(time_s))]), **still))
+    assert one.motion is not None and one.jumps_found == 0
+    assert one.motion.difference_rms_mps == pytest.approx(0.04 * np.sqrt(0.05), rel=0.01)
 
 
 @pytest.mark.parametrize("step_s", [0.1, 1.0])
