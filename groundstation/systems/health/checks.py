@@ -433,6 +433,8 @@ def _reason(
     if verdict == "not_logged":
         if any(one.is_unjudged for one in measures):
             return "not judged: no limit in the log"
+        if any(one.median is not None for one in measures):
+            return "logged at one moment alone: no time to judge"
         return f"logged, but not {over}" if measures else ""
     if texts:
         counts = Counter(texts)

@@ -75,6 +75,11 @@ def test_what_is_logged_on_the_ground_alone_is_not_logged() -> None:
     assert check.reason == "logged, but not in the air"
 
 
+def test_a_single_sample_in_the_air_is_not_told_as_outside_it() -> None:
+    check = checked(evidence("hdop", np.array([40.0]), np.array([20.0])))["gnss"]
+    assert (check.verdict, check.reason) == ("not_logged", "logged at one moment alone: no time to judge")
+
+
 def test_nothing_but_nan_is_not_logged() -> None:
     check = checked(evidence("hdop", seconds(), np.full(len(seconds()), np.nan)))["gnss"]
     assert (check.verdict, check.measures) == ("not_logged", ())
