@@ -600,3 +600,17 @@ def test_a_row_that_is_late_is_no_missing_epoch() -> None:
     found = reception(table(time_s))
     assert found.answer.receiver.missed_epochs == 0 and "fix never lost; 12 sat" in found.answer.sentence
     assert not any(isinstance(figure, GnssMissing) for figure in found.answer.figures)
+
+
+@pytest.mark.parametrize(("step_s", "late_s"), [(0.1, 0.25), (0.2, 0.45)])
+def test_a_row_that_is_late_by_several_steps_is_no_gap(step_s: float, late_s: float) -> None:
+    """Rows wait in a buffer and come together: none is missing, whatever the time of arrival; 3 at 100 s are."""
+    due_s = np.arange(0.0, 200.0, step_s)
+    due_s = due_s[(due_s < 100.05) | (due_s > 100.05 + 3.0 * step_s)]
+    late = (np.arange(len(due_s)) % 50 == 25) & (due_s < 90.0)
+    time_s = np.maximum.accumulate(due_s + late_s * late) + 1e-4 * np.arange(len(due_s)) / len(due_s)
+    one = receiver(table(time_s))
+    assert one.missed_epochs == 3
+    assert [loss.start_s for loss in one.losses] == [pytest.approx(100.0, abs=1e-3)]
+    found = reception(table(time_s))
+    assert not [one.text for one in found.findings if one.severity == "warn"]
