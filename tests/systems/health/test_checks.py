@@ -59,6 +59,15 @@ def test_lanes_show_what_decided_by_a_median_and_when_a_counter_rose() -> None:
     assert (verdicts["magnetometer"], verdicts["timing"]) == ("fail", "warn")
 
 
+def test_a_lane_in_the_air_is_no_worse_than_its_counter_is_judged() -> None:
+    time = seconds()
+    clipped = evidence("clipping", time, np.where(time < 5.0, 0.0, np.where(time < 50.0, 150.0, 151.0)))
+    checks, (one,) = judge(flight(), (clipped,), (), AIR, thresholds({}))
+    assert {check.key: check.verdict for check in checks}["clipping"] == "warn"
+    rows = np.flatnonzero(one.grade > 0)
+    assert (time[rows].tolist(), one.grade[rows].tolist()) == (pytest.approx([5.0, 50.0]), [2, 1])
+
+
 def test_what_is_on_the_ground_does_not_count() -> None:
     time = seconds()
     found = measure("vibration_mps2", time, np.where(time < 10.0, 90.0, 5.0))
