@@ -103,6 +103,16 @@ def test_gaps_are_those_of_the_ledger_and_a_step_of_the_limit_is_none() -> None:
     assert (loss.start_s, loss.seconds) == pytest.approx((120.0, 0.8))  # from row to row
 
 
+def test_a_fix_that_is_lost_for_single_epochs_is_not_lost_0_times() -> None:
+    time_s = times(0.1)
+    found = reception(table(time_s, fix=np.where(np.arange(len(time_s)) % 5 == 0, "none", "3d")))
+    (told,) = [one for one in found.findings if one.code == "gnss.lost"]
+    assert (told.severity, told.text) == (
+        "warn",
+        "fix lost for no longer than 0.5 s each time, 36 s in all (20 % of the time)",
+    )
+
+
 @pytest.mark.parametrize("start_s", [0.0, 100.0])
 def test_a_gap_has_the_speed_and_the_way_from_its_own_row(start_s: float) -> None:
     """Behind the first row too, at which the vehicle stands."""
