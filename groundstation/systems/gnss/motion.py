@@ -120,7 +120,10 @@ def _lasting_mps(beyond_m: FloatArray, step_s: FloatArray, usable: BoolArray) ->
 
 
 def _is_usual(size: FloatArray, least: FloatArray | float = 0.0) -> BoolArray:
-    """Tell which differences are no outliers, as jumps of the position are; none below ``least`` is."""
+    """Tell which differences are no outliers, as jumps of the position are.
+
+    None below ``least`` is.
+    """
     return np.asarray(size <= np.maximum(least, max(ROBUST_SIGMAS * _usual(size), ROUNDING)))
 
 
@@ -135,9 +138,9 @@ def _usual(size: FloatArray) -> float:
 
 
 def _coarse_m(one: ReceiverRows) -> float:
-    """Return how far places may be off by the steps they are logged in, in latitude and in longitude.
+    """Return how far places may be off by the steps that they are logged in.
 
-    0 where latitude changes so seldom that its smallest change may be a jump.
+    Of latitude and longitude together; 0 where latitude changes so seldom that its smallest change may be a jump.
     """
     changes = np.count_nonzero(np.abs(np.diff(one.latitude_deg)) > 0.0)
     return float(np.sqrt(2.0)) * one.resolution_m if changes >= LEAST_STEPS else 0.0
