@@ -102,7 +102,8 @@ def _lost(one: GnssReceiver, settings: GnssSettings) -> list[Judged]:
     if not losses and share <= settings.lost_share_warn:
         return []
     grade: Grade = "bad" if share > settings.lost_share_bad else "warn" if share > settings.lost_share_warn else "good"
-    text = f"fix lost {len(losses)} times, {seconds_text(one.lost_s)} in all ({share_text(share)} of the time)"
+    times = f"{len(losses)} times" if losses else f"for no longer than {seconds_text(settings.loss_min_s)} each time"
+    text = f"fix lost {times}, {seconds_text(one.lost_s)} in all ({share_text(share)} of the time)"
     if len(losses) == 1:
         text = f"{name_of(losses[0].state)} for {seconds_text(losses[0].seconds)}{_speed(losses[0])}"
     place = f"at {losses[0].start_s:.1f} s" if losses else ""

@@ -20,6 +20,7 @@ ALONG_ONLY = 0.2  # of its part along the motion: a smaller part across is a shi
 FAST_MPS = 5.0  # slower, a step along the motion is as likely one of the place
 ROBUST_SIGMAS = 5.0
 ROUNDING = 1e-6  # m or m/s: a smaller difference is none
+RARE = 0.1  # of all steps: jumps are fewer
 BY_PHASE = ("rtk_fixed", "rtk_float", "ppp")
 
 
@@ -78,7 +79,8 @@ def _motion(
     difference = beyond_m[usable] / step_s[usable, None]
     seconds = float(step_s[usable].sum())
     acceleration = (np.diff(one.velocity_mps[:, :2], axis=0) / step_s[:, None])[usable]
-    kept = _is_usual(np.linalg.norm(difference - _middle_slope(acceleration, difference) * acceleration, axis=1))
+    left = np.linalg.norm(difference - _middle_slope(acceleration, difference) * acceleration, axis=1)
+    kept = _is_usual(left, _coarse_m(one) / step_s[usable])
     rms = float(np.sqrt(np.mean(np.sum(difference[kept] ** 2, axis=1))))
     lag_s, sigma_s = slope(acceleration[kept].ravel(), difference[kept].ravel())
     is_known = np.isfinite(sigma_s) and sigma_s <= settings.lag_sigma_max_s
@@ -117,19 +119,31 @@ def _lasting_mps(beyond_m: FloatArray, step_s: FloatArray, usable: BoolArray) ->
     return float(np.sqrt(np.mean(size[_is_usual(size)] ** 2)))
 
 
-def _is_usual(size: FloatArray) -> BoolArray:
-    """Tell which differences are no outliers, as jumps of the position are."""
-    return np.asarray(size <= max(ROBUST_SIGMAS * _usual(size), ROUNDING))
+def _is_usual(size: FloatArray, least: FloatArray | float = 0.0) -> BoolArray:
+    """Tell which differences are no outliers, as jumps of the position are.
+
+    None below ``least`` is.
+    """
+    return np.asarray(size <= np.maximum(least, max(ROBUST_SIGMAS * _usual(size), ROUNDING)))
 
 
 def _usual(size: FloatArray) -> float:
     """Return the usual size of differences, as a sigma.
 
     Differences of nothing are left out: between rows of the same place, as a receiver writes it in coarse steps or
-    holds it, they say nothing of the others. 0 where there are no others.
+    holds it, they say nothing of the others. 0 where the others are so few that they may all be jumps.
     """
     beyond = size[size > ROUNDING]
-    return MAD_TO_SIGMA * float(np.median(beyond)) if beyond.size else 0.0
+    return MAD_TO_SIGMA * float(np.median(beyond)) if beyond.size > RARE * size.size else 0.0
+
+
+def _coarse_m(one: ReceiverRows) -> float:
+    """Return how far places may be off by the steps that they are logged in.
+
+    Of latitude and longitude together; 0 where latitude changes so seldom that its smallest change may be a jump.
+    """
+    changes = np.count_nonzero(np.abs(np.diff(one.latitude_deg)) > 0.0)
+    return float(np.sqrt(2.0)) * one.resolution_m if changes >= LEAST_STEPS else 0.0
 
 
 def _middle_slope(x: FloatArray, y: FloatArray) -> float:
@@ -171,7 +185,7 @@ def _jumps(
 
     Places that are logged in steps may be off by one of them in latitude and in longitude.
     """
-    size = np.maximum(_beyond_jitter(one, beyond_m, settings) - np.sqrt(2.0) * one.resolution_m, 0.0)
+    size = np.maximum(_beyond_jitter(one, beyond_m, settings) - _coarse_m(one), 0.0)
     finite = np.isfinite(size)
     if np.count_nonzero(finite) < LEAST_STEPS:
         return (), 0

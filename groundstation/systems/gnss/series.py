@@ -15,6 +15,7 @@ from groundstation.base.signals import topics_of_kind
 from groundstation.systems.gnss.answer import WITHOUT_FIX
 from groundstation.systems.gnss.settings import GnssSettings
 from groundstation.tables.gaps import largest_step_s
+from groundstation.tables.motion import runs
 from groundstation.tables.table import Flight, Table
 
 ROUNDING_S = 1e-6  # of flight seconds: a step of exactly the limit is no gap
@@ -103,22 +104,34 @@ class ReceiverRows:
 
     @property
     def is_gap(self) -> BoolArray:
-        """Tell behind which rows there is a gap or a pause of the log, shape (n - 1,)."""
-        return (self.steps_s > self.gap_s) | (np.diff(self.time_s) > self.steps_s + 1e-6)
+        """Tell behind which rows there is a gap or a pause of the log, shape (n - 1,).
+
+        A row that is late, and those behind it catch up, is none: nothing is missing.
+        """
+        is_long, missing = self.steps_s > self.gap_s, self.missing
+        if missing is not None:
+            is_long &= missing > 0
+        return is_long | (np.diff(self.time_s) > self.steps_s + 1e-6)
 
     @property
     def missing(self) -> NDArray[np.intp] | None:
         """Epochs that are missing behind each row but the last, shape (n - 1,).
 
-        A row that is late, and whose neighbour catches up, misses none. None where the rate is not regular.
+        A row that is late, and whose neighbours catch up, misses none. None where the rate is not regular.
         """
-        steps = self.steps_s
-        if not len(steps) or np.mean(np.abs(steps - self.step_s) <= REGULAR_STEP * self.step_s) < REGULAR_SHARE:
+        beyond = self.steps_s / self.step_s - 1.0
+        is_odd = np.abs(beyond) > REGULAR_STEP
+        if not len(beyond) or np.mean(~is_odd) < REGULAR_SHARE:
             return None
-        alone = np.round(steps / self.step_s) - 1.0
-        beyond = np.pad(steps / self.step_s - 1.0, 1)
-        around = np.round(beyond[:-2] + beyond[1:-1] + beyond[2:])
-        return np.maximum(np.minimum(alone, around), 0.0).astype(np.intp)
+        wide = np.pad(is_odd, 1)
+        wide = wide[:-2] | wide[1:-1] | wide[2:]  # with a neighbour on each side
+        alone = np.maximum(np.round(beyond), 0.0)
+        missing = np.zeros(len(beyond), dtype=np.intp)
+        for first, behind in runs(wide):
+            mine = alone[first:behind]
+            left = np.round(beyond[first:behind].sum()) - (np.cumsum(mine) - mine)
+            missing[first:behind] = np.clip(left, 0.0, mine)
+        return missing
 
     @property
     def missed(self) -> int | None:

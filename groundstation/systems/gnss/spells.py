@@ -168,7 +168,7 @@ def seconds_after_first_fix(one: ReceiverRows, spells: Spells, kinds: tuple[str,
 
 def _around(one: ReceiverRows, with_fix: NDArray[np.intp], start_s: float, end_s: float) -> tuple[int, int | None]:
     """Return the last row with a fix before a loss, and the first one after it."""
-    at = int(np.searchsorted(one.time_s[with_fix], start_s))
+    at = int(np.searchsorted(one.time_s[with_fix], start_s, side="right"))  # a gap begins at that row itself
     later = int(np.searchsorted(one.time_s[with_fix], end_s - 1e-6))
     return int(with_fix[at - 1]), int(with_fix[later]) if later < len(with_fix) else None
 

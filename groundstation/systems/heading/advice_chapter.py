@@ -10,7 +10,14 @@ from groundstation.chapters.wording import number, significant
 from groundstation.results.flight import KIND_OF_VEHICLE, WHY_THAT_VEHICLE, FlightResults
 from groundstation.results.gates import NO_CONTACT, NOT_PROVEN, Gate, in_plain_words
 from groundstation.systems.heading.answer import HeadingResult
-from groundstation.systems.heading.gates_answer import GATES, LONGER, STATE_THE_KIND, TAXI_ALONE, UNPROVEN
+from groundstation.systems.heading.gates_answer import (
+    GATES,
+    LONGER,
+    STATE_THE_KIND,
+    TAXI_ALONE,
+    UNPROVEN,
+    UNPROVEN_OPEN,
+)
 
 PURPOSE = "heading correction"
 WHEELS = "weight on wheels"
@@ -49,7 +56,7 @@ def advise(results: FlightResults) -> Iterator[Advice]:
     for gate in answer.gates:
         if gate.state == "failed" or (gate.state == "not_measured" and gate.required):
             yield from _against(gate, answer, standstill)
-    is_told = any(gate.name == UNPROVEN and gate.state == "failed" for gate in answer.gates)
+    is_told = any(gate.name in (UNPROVEN, UNPROVEN_OPEN) and gate.state == "failed" for gate in answer.gates)
     if answer.unproven_ground is not None and not is_told:
         yield _on_proof(results)
 

@@ -18,7 +18,7 @@ from groundstation.chapters.wording import (
     with_full_stop,
 )
 from groundstation.systems.heading.answer import HeadingResult
-from groundstation.systems.heading.gates_answer import LEAVES_OPEN, UNPROVEN
+from groundstation.systems.heading.gates_answer import LEAVES_OPEN, UNPROVEN, UNPROVEN_OPEN
 from groundstation.systems.heading.reason_answer import why_alone
 
 PUBLISHED_LIMIT_ARCMIN = 20.0
@@ -84,10 +84,10 @@ def _left_out(heading: HeadingResult) -> str:
 
     Empty where none is, or where the reason of the verdict says it.
     """
-    gate = next((one for one in heading.gates if one.name == UNPROVEN), None)
-    if heading.unproven_ground is None or gate is None or gate.state == "failed":
+    gates = [one for one in heading.gates if one.name in (UNPROVEN, UNPROVEN_OPEN)]
+    if heading.unproven_ground is None or not gates or any(one.state == "failed" for one in gates):
         return ""
-    return with_full_stop(typeset(gate.reason))
+    return with_full_stop(typeset(gates[0].reason))
 
 
 def half_width(ends: tuple[float, float]) -> str:

@@ -11,7 +11,7 @@ from groundstation.results.gates import Bound
 
 NextLine = Literal["Fly", "Record", "Check"]
 WHOLE, TAXI_ALONE, STANDSTILL_SPEED = "whole_half_width", "half_width", "standstill_speed_of_mean"
-UNPROVEN = "unproven_ground"
+UNPROVEN, UNPROVEN_OPEN = "unproven_ground", "unproven_ground_open"
 STATE_THE_KIND = (
     'the kind of vehicle: state vehicle = "rolls" in the aircraft file (--aircraft) if it never flies, all its '
     "straight epochs then count"
@@ -176,6 +176,16 @@ GATES: Mapping[str, GateKind] = {  # in the order in which a crew is told of the
             required="if_measured",
             failed="{reason}",
             advice=STATE_THE_KIND,
+            in_interval=False,
+        ),
+        GateKind(
+            UNPROVEN_OPEN,
+            "gates that ask for more data only with the straight epochs of unproven ground",
+            limit=(None, 0.0),
+            required="if_measured",
+            failed="{reason}",
+            advice=STATE_THE_KIND,
+            cured_by_more_data=True,
             in_interval=False,
         ),
         GateKind(

@@ -13,6 +13,7 @@ from groundstation.methods.taxi.gating import NOT_PROVEN, is_straight_and_fast
 from groundstation.methods.taxi.samples import TaxiSamples
 from groundstation.results.gates import Gate
 from groundstation.systems.heading.answer import HeadingResult, UnprovenGround
+from groundstation.systems.heading.gates_answer import CURED_BY_MORE_DATA
 from groundstation.systems.heading.reason_answer import BETWEEN
 from groundstation.systems.heading.settings import HeadingSettings
 from groundstation.systems.heading.wording import left_out_told, told
@@ -72,6 +73,7 @@ class Objections:
 
     count: int
     told: str
+    is_curable: bool = False  # all of them only ask for more data
 
 
 def objections(
@@ -99,4 +101,5 @@ def objections(
     is_outside = abs(float(wrap_180(whole.error_deg - middle))) > half
     outside = "the error lies outside the 95 % interval" if is_outside else ""
     parts = (outside, told(further).replace(BETWEEN, ", "))
-    return Objections(len(further) + is_outside, ", ".join(filter(None, parts)))
+    is_curable = not is_outside and all(gate.name in CURED_BY_MORE_DATA for gate in further)
+    return Objections(len(further) + is_outside, ", ".join(filter(None, parts)), bool(further) and is_curable)

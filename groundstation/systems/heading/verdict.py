@@ -20,6 +20,7 @@ from groundstation.systems.heading.gates_answer import (
     STANDSTILL_SPEED,
     TAXI_ALONE,
     UNPROVEN,
+    UNPROVEN_OPEN,
     WHOLE,
     GateKind,
 )
@@ -147,15 +148,22 @@ def build_gates(
         *_normality_gates(values.normality, judge),
         *_steadiness_gates(values, judge),
     )
-    return (*throughout, _unproven_gate((*throughout, *later), values, judge), *later)
+    return (*throughout, *_unproven_gates((*throughout, *later), values, judge), *later)
 
 
-def _unproven_gate(others: tuple[Gate, ...], values: JudgedValues, judge: _Judge) -> Gate:
-    """Judge what the straight epochs of unproven ground say against the others."""
+def _unproven_gates(others: tuple[Gate, ...], values: JudgedValues, judge: _Judge) -> tuple[Gate, ...]:
+    """Judge what the straight epochs of unproven ground say against the others.
+
+    Where it only asks for more data, as the others would, that is no contradiction: the second gate fails.
+    """
     if values.unproven_ground is None:
-        return judge(UNPROVEN, 0.0, "no straight epoch is left out for it")
-    found = objections(others, values.interval_deg, values.whole)
-    return judge(UNPROVEN, None if found is None else float(found.count), reason_of(values.unproven_ground, found))
+        return tuple(judge(name, 0.0, "no straight epoch is left out for it") for name in (UNPROVEN, UNPROVEN_OPEN))
+    found, left = objections(others, values.interval_deg, values.whole), values.unproven_ground
+    reason = reason_of(left, found)
+    if found is None:
+        return judge(UNPROVEN, None, reason), judge(UNPROVEN_OPEN, None, reason)
+    counts = (0.0, float(found.count)) if found.is_curable else (float(found.count), 0.0)
+    return judge(UNPROVEN, counts[0], reason), judge(UNPROVEN_OPEN, counts[1], reason)
 
 
 def _throughout_gates(

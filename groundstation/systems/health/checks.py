@@ -173,7 +173,7 @@ def _judged(flight: Flight, evidence: Evidence, air: Spans, limit: Threshold, cl
         grade = _lasting(time_ns, until_ns, grade, round(limit.hold_s * NS_PER_S))
     measure = _measure(flight, evidence, limit, grade, clock, air)
     if limit.rule == "rise":  # its lane shows when it rose; how long that lasts says nothing
-        grade = np.where(known, _rises(evidence.value, limit), -1)
+        grade = np.where(known, _rises(evidence.value, clock.in_air, limit), -1)
     return Judged(
         evidence, measure, flight.seconds(time_ns), flight.seconds(until_ns), grade, clock.in_air, limit.is_drawn
     )
@@ -318,16 +318,17 @@ def rise(value: FloatArray, flown: np.ndarray) -> float:
     return float(begun_again[flown[known][1:]].sum())
 
 
-def _rises(value: FloatArray, limit: Threshold) -> np.ndarray:
+def _rises(value: FloatArray, in_air: np.ndarray, limit: Threshold) -> np.ndarray:
     """Return the grade of the samples at which a counter rose.
 
-    It is by how far the counter has risen until then.
+    It is by how far the counter has risen until then: in the air by what it rose there, as the check counts it.
     """
     grade = np.zeros(len(value), dtype=np.int8)
     known = np.flatnonzero(np.isfinite(value))
     steps = np.diff(value[known])
     steps = np.where(steps < 0.0, value[known][1:], steps)
-    risen = np.cumsum(steps)
+    flown = in_air[known][1:]
+    risen = np.where(flown, np.cumsum(np.where(flown, steps, 0.0)), np.cumsum(steps))
     for level, above in ((1, limit.amber), (2, limit.red)):
         if above is not None:
             grade[known[1:][(steps > 0.0) & (risen > above)]] = level
@@ -433,6 +434,8 @@ def _reason(
     if verdict == "not_logged":
         if any(one.is_unjudged for one in measures):
             return "not judged: no limit in the log"
+        if any(one.median is not None for one in measures):
+            return "logged at one moment alone: no time to judge"
         return f"logged, but not {over}" if measures else ""
     if texts:
         counts = Counter(texts)

@@ -59,7 +59,7 @@ OF_QUANTITY: Mapping[str, str] = {  # what a person says where this quantity dec
     "dropouts_ms": "log with gaps",
     "cpu_load": "CPU overloaded",
     "slow_loops": "loops too slow",
-    "not_the_one_set": "another estimator than the one set flew",
+    "not_the_one_set": "another estimator in use than the one set",
     "radio_margin_db": "radio weak",
     "packets_lost": "telemetry with losses",
     "time_slip_s": "filter's clock slipped",

@@ -103,6 +103,27 @@ def test_gaps_are_those_of_the_ledger_and_a_step_of_the_limit_is_none() -> None:
     assert (loss.start_s, loss.seconds) == pytest.approx((120.0, 0.8))  # from row to row
 
 
+def test_a_fix_that_is_lost_for_single_epochs_is_not_lost_0_times() -> None:
+    time_s = times(0.1)
+    found = reception(table(time_s, fix=np.where(np.arange(len(time_s)) % 5 == 0, "none", "3d")))
+    (told,) = [one for one in found.findings if one.code == "gnss.lost"]
+    assert (told.severity, told.text) == (
+        "warn",
+        "fix lost for no longer than 0.5 s each time, 36 s in all (20 % of the time)",
+    )
+
+
+@pytest.mark.parametrize("start_s", [0.0, 100.0])
+def test_a_gap_has_the_speed_and_the_way_from_its_own_row(start_s: float) -> None:
+    """Behind the first row too, at which the vehicle stands."""
+    time_s = times()
+    (loss,) = receiver(table(time_s[(time_s <= start_s + 0.1) | (time_s > start_s + 5.9)])).losses
+    place, velocity = motion(np.array([start_s, start_s + 6.0]))
+    assert (loss.start_s, loss.seconds) == pytest.approx((start_s, 6.0))
+    assert loss.speed_before_mps == pytest.approx(float(np.hypot(*velocity[0])))
+    assert loss.moved_m == pytest.approx(float(np.hypot(*(place[1] - place[0]))), rel=1e-4)
+
+
 def test_a_gap_that_others_share_but_for_a_row_late_is_the_logs() -> None:
     time_s = times()
     rows = table(time_s[(time_s < 100.0) | (time_s >= 103.0)])
@@ -401,6 +422,26 @@ def test_places_in_coarse_steps_differ_from_a_velocity_of_zero() -> None:
     assert one.motion.difference_rms_mps == pytest.approx(0.04 * np.sqrt(0.2), rel=0.01), "without the jumps"
 
 
+def test_a_receiver_that_holds_its_place_still_jumps() -> None:
+    """Every step but one is of nothing."""
+    time_s = times(0.5)
+    still = {f"velocity_{axis}_mps": np.zeros(len(time_s)) for axis in ("north", "east")}
+    far = np.column_stack([300.0 * (time_s >= 90.0), np.zeros(len(time_s))])
+    one = receiver(table(time_s, place_m=far, **still))
+    assert one.jumps_found == 1 and one.jumps[0].size_m == pytest.approx(300.0, rel=1e-3)
+    assert one.motion is not None and one.motion.difference_rms_mps == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_place_that_is_seldom_another_step_is_no_jump_and_no_outlier() -> None:
+    """Fewer steps of 2 cm than jumps may be: they count in the difference all the same."""
+    time_s = times(0.5)
+    still = {f"velocity_{axis}_mps": np.zeros(len(time_s)) for axis in ("north", "east")}
+    moved = np.isin(np.arange(len(time_s)) % 40, (3, 4, 5))  # there and back nine times
+    one = receiver(table(time_s, place_m=np.column_stack([0.02 * moved, np.zeros(len(time_s))]), **still))
+    assert one.motion is not None and one.jumps_found == 0
+    assert one.motion.difference_rms_mps == pytest.approx(0.04 * np.sqrt(0.05), rel=0.01)
+
+
 @pytest.mark.parametrize("step_s", [0.1, 1.0])
 def test_noise_of_the_fixes_is_no_other_motion(step_s: float) -> None:
     """Fixes that scatter by 0.8 m at 10 Hz differ from their velocity by 11 m/s, and tell the same motion."""
@@ -569,3 +610,17 @@ def test_a_row_that_is_late_is_no_missing_epoch() -> None:
     found = reception(table(time_s))
     assert found.answer.receiver.missed_epochs == 0 and "fix never lost; 12 sat" in found.answer.sentence
     assert not any(isinstance(figure, GnssMissing) for figure in found.answer.figures)
+
+
+@pytest.mark.parametrize(("step_s", "late_s"), [(0.1, 0.25), (0.2, 0.45)])
+def test_a_row_that_is_late_by_several_steps_is_no_gap(step_s: float, late_s: float) -> None:
+    """Rows wait in a buffer and come together: none is missing, whatever the time of arrival; 3 at 100 s are."""
+    due_s = np.arange(0.0, 200.0, step_s)
+    due_s = due_s[(due_s < 100.05) | (due_s > 100.05 + 3.0 * step_s)]
+    late = (np.arange(len(due_s)) % 50 == 25) & (due_s < 90.0)
+    time_s = np.maximum.accumulate(due_s + late_s * late) + 1e-4 * np.arange(len(due_s)) / len(due_s)
+    one = receiver(table(time_s))
+    assert one.missed_epochs == 3
+    assert [loss.start_s for loss in one.losses] == [pytest.approx(100.0, abs=1e-3)]
+    found = reception(table(time_s))
+    assert not [one.text for one in found.findings if one.severity == "warn"]

@@ -1,6 +1,8 @@
 """Straight epochs left out as ground is not proven: what they say against the answer is heard."""
 
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import cast
 
 import numpy as np
 import pytest
@@ -10,14 +12,14 @@ from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.chapters.parts import Facts
 from groundstation.results.flight import KIND_OF_VEHICLE, WHY_THAT_VEHICLE, FlightResults, NotAssessable
 from groundstation.results.gates import Gate
-from groundstation.simulation.taxi import TaxiCase, simulate_taxi, taxi_flight
+from groundstation.simulation.taxi import TaxiCase, draw_run, simulate_taxi, taxi_flight
 from groundstation.systems.heading.analysis import HEADING
 from groundstation.systems.heading.answer import HeadingResult, UnprovenGround
 from groundstation.systems.heading.claim_chapter import claim
 from groundstation.systems.heading.estimate import estimate_heading_error
-from groundstation.systems.heading.gates_answer import UNPROVEN
+from groundstation.systems.heading.gates_answer import UNPROVEN, UNPROVEN_OPEN, WHOLE
 from groundstation.systems.heading.settings import HeadingSettings
-from groundstation.systems.known import AircraftData
+from groundstation.systems.known import AircraftClass, AircraftData
 from groundstation.tables.phases import Phases
 from groundstation.tables.table import Flight
 from groundstation.tables.vehicle import Vehicle
@@ -97,6 +99,28 @@ def test_epochs_left_out_that_agree_leave_the_accept_and_are_told(steady: Flight
     told = f"{left.epochs} of {left.straight} straight epochs left out as ground is not proven"
     assert told in HEADING.sentence({"heading": found})
     assert any(sentence.startswith(f"{told}, with them") for sentence in claim(found).sentences)
+
+
+def test_epochs_left_out_that_ask_for_more_data_alone_do_not_reject() -> None:
+    """A short taxi, whose epochs together are known worse than by the proven ones: no contradiction."""
+    run = draw_run("wide", 4711, 46)
+    flight, end_s = taxi_flight(run), run.taxi_start_s + 0.6 * float(run.gnss_time_s[-1] - run.taxi_start_s)
+    aircraft = replace(
+        AircraftData(antenna_arm_m=run.case.antenna_arm_m if run.case.is_arm_known else None, antenna_arm_sigma_m=0.05),
+        aircraft_class=cast(AircraftClass, run.case.disturbance.aircraft_class),
+    )
+    metar = run.case.disturbance.metar
+
+    def proof(time_ns: Int64Array) -> Contact:
+        return Contact(np.asarray(flight.seconds(time_ns) < end_s))
+
+    judged = partial(estimate_heading_error, flight, settings=FEW, aircraft=aircraft, weather=(metar,) if metar else ())
+    found, together = judged(on_ground=proof, phases=FOUND), judged()
+    assert {one.name for one in together.gates if one.state == "failed" and one.required} == {WHOLE}
+    assert (found.verdict, together.verdict) == ("extend", "extend")
+    states = {one.name: one.state for one in found.gates}
+    assert (states[UNPROVEN], states[UNPROVEN_OPEN]) == ("passed", "failed")
+    assert "straight epochs left out as ground is not proven, with them " in found.verdict_reason
 
 
 @pytest.mark.parametrize("phases", [STATED, UNKNOWN])

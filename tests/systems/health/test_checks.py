@@ -59,6 +59,15 @@ def test_lanes_show_what_decided_by_a_median_and_when_a_counter_rose() -> None:
     assert (verdicts["magnetometer"], verdicts["timing"]) == ("fail", "warn")
 
 
+def test_a_lane_in_the_air_is_no_worse_than_its_counter_is_judged() -> None:
+    time = seconds()
+    clipped = evidence("clipping", time, np.where(time < 5.0, 0.0, np.where(time < 50.0, 150.0, 151.0)))
+    checks, (one,) = judge(flight(), (clipped,), (), AIR, thresholds({}))
+    assert {check.key: check.verdict for check in checks}["clipping"] == "warn"
+    rows = np.flatnonzero(one.grade > 0)
+    assert (time[rows].tolist(), one.grade[rows].tolist()) == (pytest.approx([5.0, 50.0]), [2, 1])
+
+
 def test_what_is_on_the_ground_does_not_count() -> None:
     time = seconds()
     found = measure("vibration_mps2", time, np.where(time < 10.0, 90.0, 5.0))
@@ -73,6 +82,11 @@ def test_what_is_logged_on_the_ground_alone_is_not_logged() -> None:
     check = checked(evidence("vibration_mps2", time, np.full(len(time), 5.0)))["vibration"]
     assert check.verdict == "not_logged"
     assert check.reason == "logged, but not in the air"
+
+
+def test_a_single_sample_in_the_air_is_not_told_as_outside_it() -> None:
+    check = checked(evidence("hdop", np.array([40.0]), np.array([20.0])))["gnss"]
+    assert (check.verdict, check.reason) == ("not_logged", "logged at one moment alone: no time to judge")
 
 
 def test_nothing_but_nan_is_not_logged() -> None:
