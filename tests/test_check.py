@@ -323,3 +323,22 @@ def test_tables_whose_rows_were_counted_are_made_without_a_move(
         flight, *_rest = export._read(path, Configuration())
         assert len(flight["ins"]) == rows
     assert not moves
+
+
+def test_a_gap_is_no_loss_beside_the_end_that_is_cut_off_and_a_damaged_mcap_is_one(tmp_path: Path) -> None:
+    log = DataFlash()
+    log.define(130, "ATT", "QccC", "TimeUS,Roll,Pitch,Yaw")
+    for row in range(100):
+        log.write("ATT", 1_000_000 + 20_000 * row + (900_000 if row > 50 else 0), 100, 50, 9_000)
+    path, target = tmp_path / "cut.BIN", tmp_path / "cut.mcap"
+    path.write_bytes(log.content[:-3])
+    code, entry = checked(path)
+    assert code == 3 and "data.gaps" in {one["code"] for one in entry["findings"]}
+    assert entry["text"].startswith("end cut off, ")
+    (done,) = convert_many([path], target)
+    content = bytearray(target.read_bytes())
+    content[len(content) // 3] ^= 0xFF
+    target.write_bytes(content)
+    code, entry = checked(target)
+    assert code == 3 and any(one["code"].startswith("store.") for one in entry["findings"])
+    assert entry["text"].startswith("data lost, ")
