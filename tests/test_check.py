@@ -340,6 +340,8 @@ def test_a_gap_is_no_loss_beside_the_end_that_is_cut_off_and_a_damaged_mcap_is_o
     assert converted.loss == "end cut off"
     told = groundstation("info", path, dataflash(tmp_path / "noise.BIN"))[1].splitlines()
     assert told[0].endswith("  end cut off") and told[1].endswith("  data lost")
+    (cut := tmp_path / "half.mcap").write_bytes(target.read_bytes()[: target.stat().st_size // 2])
+    assert groundstation("info", cut, path)[1].splitlines()[0].endswith("  end cut off")
     content = bytearray(target.read_bytes())
     content[len(content) // 3] ^= 0xFF
     target.write_bytes(content)

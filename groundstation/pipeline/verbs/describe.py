@@ -194,6 +194,7 @@ def suggest_icd(path: Path) -> str:
 
 
 def _stored(log: Log) -> Description:
+    from groundstation.integrity.ledger import damage_entry
     from groundstation.pipeline.one_flight.convert import damage_finding
     from groundstation.store.reader import read_info
 
@@ -214,7 +215,8 @@ def _stored(log: Log) -> Description:
     findings = (*info.findings, *(damage_finding(damage) for damage in damages))
     lost, topics = _has_lost(info, damages), _topics(info.ledger, fields)
     power_ups = told_of(segments_in(info), info.has_utc)
-    return Description(facts, topics, findings, lost, _buses(buses, log), bool(fields), power_ups, info.ledger.loss)
+    ledger = replace(info.ledger, damages=(*info.ledger.damages, *map(damage_entry, damages)))
+    return Description(facts, topics, findings, lost, _buses(buses, log), bool(fields), power_ups, ledger.loss)
 
 
 def _has_lost(info: StoreInfo, damages: list[Damage]) -> bool:
