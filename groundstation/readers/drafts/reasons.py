@@ -65,7 +65,8 @@ def _unlisted(sample: "TableSample", name: str, values: Mapping[str, float | str
 
     words = list(dict.fromkeys(sample.filled(sample.names.index(name))))
     unknown = looked_up(pa.array(words, pa.string()), values, "").unreadable
-    return listed([repr(word) for word, is_unknown in zip(words, unknown, strict=True) if is_unknown][:MOST_WORDS])
+    found = [repr(word) for word, is_unknown in zip(words, unknown, strict=True) if is_unknown]
+    return listed(found[:MOST_WORDS]) if found else ""
 
 
 def _cause(sample: "TableSample", name: str, *, is_time: bool) -> str:
