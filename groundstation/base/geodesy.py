@@ -108,8 +108,8 @@ def north_east_m(
 ) -> tuple[FloatArray, FloatArray]:
     """Displacements in metres north and east, from one origin or each from its own.
 
-    They are good to 0.1 % within 50 km. The date line is crossed as if it were not there. An impossible position (a latitude beyond 90 deg, a longitude
-    beyond a turn) has NaN.
+    They are good to 0.1 % within 50 km. The date line is crossed as if it were not there. An impossible position (a
+    latitude beyond 90 deg, a longitude beyond a turn) has NaN.
 
     Examples
     --------
