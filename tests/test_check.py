@@ -14,6 +14,7 @@ from groundstation.cli.main import app
 from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.pipeline.verbs import describe
 from groundstation.pipeline.verbs.conversions import convert_many
 from tests.readers.dataflash_writer import DataFlash
 from tests.readers.ulog_writer import ATTITUDE, BARO, UlogWriter
@@ -323,3 +324,44 @@ def test_tables_whose_rows_were_counted_are_made_without_a_move(
         flight, *_rest = export._read(path, Configuration())
         assert len(flight["ins"]) == rows
     assert not moves
+
+
+def test_a_gap_is_no_loss_beside_the_end_that_is_cut_off_and_a_damaged_mcap_is_one(tmp_path: Path) -> None:
+    log = DataFlash()
+    log.define(130, "ATT", "QccC", "TimeUS,Roll,Pitch,Yaw")
+    for row in range(100):
+        log.write("ATT", 1_000_000 + 20_000 * row + (900_000 if row > 50 else 0), 100, 50, 9_000)
+    path, target = tmp_path / "cut.BIN", tmp_path / "cut.mcap"
+    path.write_bytes(log.content[:-3])
+    code, entry = checked(path)
+    assert code == 3 and "data.gaps" in {one["code"] for one in entry["findings"]}
+    assert entry["text"].startswith("end cut off, ")
+    (converted,) = convert_many([path], target)
+    assert converted.loss == "end cut off"
+    told = groundstation("info", path, dataflash(tmp_path / "noise.BIN"))[1].splitlines()
+    assert told[0].endswith("  end cut off") and told[1].endswith("  data lost")
+    (cut := tmp_path / "half.mcap").write_bytes(target.read_bytes()[: target.stat().st_size // 2])
+    assert groundstation("info", cut, path)[1].splitlines()[0].endswith("  end cut off")
+    content = bytearray(target.read_bytes())
+    content[len(content) // 3] ^= 0xFF
+    target.write_bytes(content)
+    code, entry = checked(target)
+    assert code == 3 and any(one["code"].startswith("store.") for one in entry["findings"])
+    assert entry["text"].startswith("data lost, ")
+
+
+def test_an_error_of_ours_on_one_log_does_not_keep_info_from_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usual, bad, good = describe.describe, dataflash(tmp_path / "bad.BIN"), dataflash(tmp_path / "good.BIN")
+
+    def failing(path: Path, *arguments: Any, **named: Any) -> describe.Description:
+        if path == bad:
+            raise ValueError("cannot convert float NaN to integer")
+        return usual(path, *arguments, **named)
+
+    monkeypatch.setattr(describe, "describe", failing)
+    code, out, error = groundstation("info", bad, good)
+    assert code == 1 and "good.BIN  dataflash" in out
+    assert "error: bad.BIN: internal error (ValueError: cannot convert float NaN to integer)" in error
+    assert "Traceback" not in error

@@ -106,12 +106,10 @@ def north_east_m(
     origin_longitude_deg: FloatArray | float,
     altitude_m: float = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
-    """Displacements in metres north and east, good to 0.1 % within 50 km.
+    """Displacements in metres north and east, from one origin or each from its own.
 
-    They are from one origin, or each from its own.
-
-    The date line is crossed as if it were not there. An impossible position (a latitude beyond 90 deg, a longitude
-    beyond a turn) has NaN.
+    They are good to 0.1 % within 50 km. The date line is crossed as if it were not there. An impossible position (a
+    latitude beyond 90 deg, a longitude beyond a turn) has NaN.
 
     Examples
     --------

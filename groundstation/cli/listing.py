@@ -3,12 +3,13 @@
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.base.errors import UsageError
 from groundstation.base.words import counted
 from groundstation.cli.application import DATA_LOST, DONE, FAILED
-from groundstation.cli.lines import LONGEST, shortened, tell_errors
+from groundstation.cli.lines import LONGEST, STATES, shortened, tell_errors
 from groundstation.cli.printing import totals
 from groundstation.cli.text import as_json, printable, say, tell
+from groundstation.pipeline.one_flight.outcome import reason_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -43,8 +44,8 @@ def describe_listed(
             found = described(path)
         except UsageError:
             raise
-        except GroundstationError as error:
-            say(f"error: {printable(str(error))}")
+        except Exception as error:  # one bad log never stops the others
+            say(f"error: {printable(reason_of(path.name, error)[0])}")
             codes.append(FAILED)
             continue
         codes.append(DATA_LOST if found.has_lost_data else DONE if found.has_records else FAILED)
@@ -65,7 +66,7 @@ def summary_of(found: "Description") -> str:
     span = " to ".join(facts[key] for key in ("first sample", "last sample") if key in facts)
     rows = sum(topic.rows or 0 for topic in found.topics)
     size = f"{counted(len(found.topics), 'topic')}, {counted(rows, 'row')}" if found.topics else "no records"
-    lost = "data lost" if found.has_lost_data else ""
+    lost = (found.loss or STATES["data_lost"]) if found.has_lost_data else ""
     return "  ".join(filter(None, (facts.get("format", ""), span, size, lost)))
 
 

@@ -74,7 +74,7 @@ def outline_of(topic: str, time_ns: Int64Array, rhythm: Rhythm, limits: GapLimit
 def says_no_log_while_disarmed(name: Column, value: Column) -> bool | None:
     """Tell whether rows of parameters say so, the last of them; None where none does."""
     rows = np.flatnonzero((np.asarray(name.values, dtype=np.str_) == LOG_DISARMED) & name.mask & value.mask)
-    return float(value.values[rows[-1]]) == 0.0 if len(rows) else None
+    return bool(value.values[rows[-1]] == 0) if len(rows) else None
 
 
 def pauses_of(

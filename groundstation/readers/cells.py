@@ -60,9 +60,7 @@ class TableCells:
 
 
 def distinct(text: Any) -> tuple[Any, NDArray[np.integer[Any]]]:
-    """Return the distinct cells of a column, and which of them each cell is.
-
-    A null stands behind them.
+    """Return the distinct cells of a column, a null last, and which of them each cell is.
 
     Examples
     --------

@@ -68,7 +68,8 @@ def items(whole: Source, fit: Fit) -> Iterator[Item]:
     places = {f"{rule.topic}.{rule.field.name}": rule.name for rule in fit.profile.columns} | {
         time: fit.profile.time.columns[0]
     }
-    for item in with_reasons(misnamed(rows, _slips(fit), fit.header.number), source, places, time):
+    words = {f"{rule.topic}.{rule.field.name}": dict(rule.values) for rule in fit.profile.columns if rule.values}
+    for item in with_reasons(misnamed(rows, _slips(fit), fit.header.number), source, places, time, words):
         yield item if clock is None or not isinstance(item, RecordBatch) else _undrifted(item, clock)
 
 

@@ -15,6 +15,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.integrity.ledger import LedgerCounts, gaps_of
 from groundstation.integrity.ledger_findings import ledger_findings
 from groundstation.integrity.ordering import corrected
+from groundstation.integrity.pauses import says_no_log_while_disarmed
 from groundstation.integrity.survey import Census, survey
 from groundstation.pipeline.one_flight.log import open_log
 from tests.readers.dataflash_writer import flight_log
@@ -235,3 +236,11 @@ def test_an_ardupilot_log_that_pauses_while_disarmed(tmp_path: Path, has_events:
     code = ("data.not_logged", "info", "") if has_events else ("data.silent", "warn", "")
     assert told(ledger) == [code] and not ledger.loses_data
     assert ledger["gnss"].coverage == pytest.approx(1.0 if has_events else 2.0 / 3.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("values", "told"), [([1.0, 0.0], True), ([0.0, 1.0], False), ([0.0, np.nan], False), (["abc", "0 or 1"], False)]
+)
+def test_the_last_setting_counts_and_no_text_or_nan_is_one(values: list[float] | list[str], told: bool) -> None:
+    names = Column(np.array(["LOG_DISARMED", "LOG_DISARMED"]))
+    assert says_no_log_while_disarmed(names, Column(np.array(values))) is told

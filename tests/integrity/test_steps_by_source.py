@@ -52,7 +52,7 @@ def test_telemetry_that_steps_back_is_counted(tmp_path: Path) -> None:
         log.add("attitude", row * 100, 0.1, -0.2, 1.0, 0.0, 0.0, 0.0, time_us=time_us)
     path = tmp_path / "a.tlog"
     path.write_bytes(log.data)
-    assert steps_back(path)["ins"] == steps_back(path)["raw.ATTITUDE"]
+    assert steps_back(path) == {"ins": 1, "raw.ATTITUDE": 1}
 
 
 @pytest.mark.real_log

@@ -147,3 +147,13 @@ def test_telemetry_names_the_source_of_the_attitude(tmp_path: Path, kind: float,
     origins = [one.text for one in registry.read(path) if isinstance(one, Remark) and "true_heading_deg" in one.fields]
     assert len(origins) == 1 and f"from {told} (ATTITUDE)" in origins[0]
     assert np.all(["filter" in one for one in origins]) == (kind == 3.0)
+
+
+@pytest.mark.parametrize("kind", [float("nan"), float("inf")])
+@pytest.mark.parametrize("flew", [(3,), (NO_ATTITUDE,)])
+def test_a_parameter_that_is_no_number_names_no_estimator(
+    tmp_path: Path, flew: tuple[int | None, ...], kind: float
+) -> None:
+    log = ardupilot(tmp_path, flew=flew, kind=kind)
+    topic = "ins" if flew == (3,) else "ins.2"
+    assert log.present(topic, "velocity_north_mps") == [1.0 + row for row in range(10)]

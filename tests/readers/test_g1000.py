@@ -59,6 +59,15 @@ def test_every_word_for_the_kind_of_fix(tmp_path: Path) -> None:
     assert Read(write(tmp_path, *rows)).values("gnss", "fix") == expected
 
 
+def test_a_word_for_the_fix_that_nobody_knows_is_named(tmp_path: Path) -> None:
+    words = ["3D", "3D+", "3D+", "DR"]
+    rows = [row(f"12:00:{at:02d}").replace(" 3D,", f" {word},") for at, word in enumerate(words)]
+    log = Read(write(tmp_path, *rows))
+    (told,) = log.damages
+    assert (told.count, told.what) == (3, "cells that the profile does not list ('3D+' and 'DR')")
+    assert len(log.values("gnss", "ground_speed_mps")) == 4
+
+
 def test_both_date_formats_headers_in_the_middle_and_rows_without_time(tmp_path: Path) -> None:
     path = write(
         tmp_path,

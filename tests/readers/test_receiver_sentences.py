@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from groundstation.base.records import Remark
 from groundstation.base.units import MPS_PER_KNOT
 from groundstation.readers.receiver import stream
 from tests.readers.receiver_writer import gga, nmea, rmc
@@ -121,6 +122,15 @@ def test_a_dilution_that_cannot_be_is_none_and_is_told_with_its_values(tmp_path:
     sound = Read(tmp_path, first + nmea(f"GNGSA,{fields},1.5,0.9,1.2"))
     assert (sound.values("gnss", "pdop"), sound.values("gnss", "hdop")) == ([1.5], [1.2])
     assert "HDOP differs between sentences in 1 row: 1.2 (GGA), 0.9 (GSA)" in sound.remark("hdops_differ")
+
+
+@pytest.mark.parametrize("sign", ["50.0", "99.9", "25.5"])
+def test_one_number_for_every_dilution_says_that_there_is_no_fix(tmp_path: Path, sign: str) -> None:
+    none = nmea(f"GNGGA,120000.00,4730.0000,N,00830.0000,E,0,00,{sign},400.0,M,47.0,M,,")
+    read = Read(tmp_path, none + nmea(f"GNGSA,A,1,01,02,03,04,,,,,,,,,{sign},{sign},{sign}"))
+    assert not {"impossible_dilution", "same_dilution", "hdops_differ"} & {
+        one.code for one in read.items if isinstance(one, Remark)
+    }
 
 
 @pytest.mark.parametrize(("unit", "heading"), [("T", 12.5), ("", 12.5), ("M", None)])

@@ -24,7 +24,7 @@ from groundstation.pipeline.one_flight.job import Job as Job
 from groundstation.pipeline.one_flight.line import line_of_results
 from groundstation.pipeline.one_flight.log import Log, digest_of, open_parts
 from groundstation.pipeline.one_flight.manifest import manifest_of
-from groundstation.pipeline.one_flight.outcome import Outcome, State, loss_of, reason_of
+from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.parts import part_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.resume import Finished, keys_of
@@ -203,7 +203,7 @@ def _run(log: Log, version: Version, job: Job, partial: Path, watch: Stopwatch) 
         failures=failures(),
         power_up=number,
         parts=parts,
-        loss=loss_of(findings),
+        loss=results.ledger.loss,
     )
 
 
@@ -298,7 +298,7 @@ def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
         failures=failures(),
         power_up=job.power_up,
         parts=finished.parts,
-        loss=loss_of(finished.findings),
+        loss=finished.loss,
     )
 
 

@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Literal
 from groundstation.base.errors import GroundstationError, lack_of_memory
 from groundstation.base.failures import Failure
 from groundstation.base.failures import reason_of as why
-from groundstation.base.findings import Finding
-from groundstation.base.ledger import END_CUT, TRUNCATED
 
 if TYPE_CHECKING:
     from groundstation.results.manifest import PartOfRun
@@ -60,7 +58,7 @@ class Outcome:
     parts : tuple of PartOfRun
         The consecutive logs of the flight: their ends show whether another log continues it.
     loss : str
-        Data lost, or the end of the log alone; empty where the state tells it.
+        Loss by the ledger of the log: data, or its end alone; empty where the state tells it.
     """
 
     source: str
@@ -84,20 +82,6 @@ class Outcome:
     def code(self) -> int:
         """Exit code of this log alone."""
         return EXIT_CODE[self.state]
-
-
-def loss_of(findings: tuple[Finding, ...]) -> str:
-    """Return that the end of a log alone is lost; empty where more is, or nothing.
-
-    Examples
-    --------
-    >>> loss_of((Finding("warn", "data.truncated", "bytes of a frame: 41"), Finding("info", "time.duplicates", "")))
-    'end cut off'
-    >>> loss_of((Finding("warn", "data.truncated", ""), Finding("warn", "data.corrupt", "")))
-    ''
-    """
-    lost = {one.code for one in findings if one.code.startswith("data.") and one.severity != "info"}
-    return END_CUT if lost == {f"data.{TRUNCATED}"} else ""
 
 
 def reason_of(name: str, error: Exception) -> tuple[str, str]:

@@ -70,6 +70,8 @@ class Finished:
         What was found, in one line.
     has_lost_data : bool
     findings : tuple of Finding
+    loss : str
+        Loss in words, as the ledger has it.
     answered : frozenset of str
         Names of the analyses that gave an answer: there are files of some.
     has_applied : bool
@@ -94,6 +96,7 @@ class Finished:
     text: str
     has_lost_data: bool
     findings: tuple[Finding, ...]
+    loss: str = ""
     answered: frozenset[str] = frozenset()
     has_applied: bool = False
     spoiled: frozenset[str] = frozenset()
@@ -264,6 +267,7 @@ def _finished(
         resume.text,
         resume.has_lost_data,
         summary.findings,
+        summary.ledger.loss,
         frozenset(name for name, found in summary.results.items() if found),
         any(finding.code.endswith(APPLIED) for finding in summary.findings),
         spoiled,

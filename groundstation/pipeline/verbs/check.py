@@ -26,7 +26,7 @@ from groundstation.pipeline.one_flight.convert import (
     why_nothing_is_placed,
 )
 from groundstation.pipeline.one_flight.log import Log, as_log, open_log, open_one_of_several
-from groundstation.pipeline.one_flight.outcome import Outcome, State, loss_of, reason_of
+from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.segments import PowerUpTold, segments_in, segments_of, told_of
 from groundstation.pipeline.verbs.describe import facts_of
@@ -325,6 +325,6 @@ def _checked(
     if fail_on in SEVERITIES and gravest and SEVERITIES.index(gravest) >= SEVERITIES.index(fail_on):
         state = "limit_reached"
     count = sum(finding.severity != "info" for finding in findings)
-    lost = (loss_of(findings) or DATA_LOST) if has_lost_data else "no data lost"
+    lost = (ledger.loss or DATA_LOST) if has_lost_data else "no data lost"
     text = f"{lost}, {counted(count, 'warning')}"
     return CheckedLog(Outcome(str(log.path), state, text, sha256=log.source.sha256), facts, ledger, clock, findings)

@@ -15,7 +15,7 @@ from groundstation.pipeline.many_flights.processes.crew import Crew, in_turn
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
 from groundstation.pipeline.one_flight.log import Log, as_log, log_name, open_log
-from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.pipeline.one_flight.outcome import Outcome, State
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.store.writer import clear_parts
 
@@ -150,7 +150,8 @@ def _convert_one(job: _Job, listen: Listener) -> Outcome:
 def _converted(source: str, converted: Converted, target: Path, told: str = "") -> Outcome:
     grave = [finding.text for finding in converted.findings if finding.severity != "info"]
     text = f"-> {target}{told}" + (f" ({'; '.join(grave)})" if grave else "")
-    return Outcome(source, "data_lost" if converted.has_lost_data else "done", text, folder=str(target))
+    state: State = "data_lost" if converted.has_lost_data else "done"
+    return Outcome(source, state, text, folder=str(target), loss=converted.info.ledger.loss)
 
 
 def _to_chapter10(log: Log, target: Path, thresholds: Thresholds) -> tuple[Converted, str]:

@@ -54,7 +54,8 @@ class BusWord:
 class Description:
     """Description of a log: facts (name to text), topics, findings, and words on its buses.
 
-    ``has_records``: at least one record of the log could be read; ``power_ups``: where it holds several.
+    ``has_records``: at least one record of the log could be read; ``power_ups``: where it holds several; ``loss``: in
+    words, as the ledger has it.
     """
 
     facts: dict[str, str]
@@ -64,11 +65,12 @@ class Description:
     buses: tuple[BusWord, ...] = ()
     has_records: bool = True
     power_ups: tuple[PowerUpTold, ...] = ()
+    loss: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         plain = asdict(self)
-        del plain["has_records"]  # the exit code tells it
+        del plain["has_records"], plain["loss"]  # the exit code and the findings tell them
         if not self.power_ups:
             del plain["power_ups"]
         return plain
@@ -136,7 +138,7 @@ def _recorded(log: Log) -> Description:
     lost = any(damage.loses_data for damage in found.damages)
     topics, findings = _topics(ledger, fields), ledger_findings(found.ledger)
     power_ups = told_of(segments_of(found.power_ups), found.clock.is_absolute)
-    return Description(facts, topics, findings, lost, _buses(buses, log), bool(topics), power_ups)
+    return Description(facts, topics, findings, lost, _buses(buses, log), bool(topics), power_ups, ledger.loss)
 
 
 def _bus_contents(ledger: Ledger) -> "BusContents | None":
@@ -192,6 +194,7 @@ def suggest_icd(path: Path) -> str:
 
 
 def _stored(log: Log) -> Description:
+    from groundstation.integrity.ledger import damage_entry
     from groundstation.pipeline.one_flight.convert import damage_finding
     from groundstation.store.reader import read_info
 
@@ -212,7 +215,8 @@ def _stored(log: Log) -> Description:
     findings = (*info.findings, *(damage_finding(damage) for damage in damages))
     lost, topics = _has_lost(info, damages), _topics(info.ledger, fields)
     power_ups = told_of(segments_in(info), info.has_utc)
-    return Description(facts, topics, findings, lost, _buses(buses, log), bool(fields), power_ups)
+    ledger = replace(info.ledger, damages=(*info.ledger.damages, *map(damage_entry, damages)))
+    return Description(facts, topics, findings, lost, _buses(buses, log), bool(fields), power_ups, ledger.loss)
 
 
 def _has_lost(info: StoreInfo, damages: list[Damage]) -> bool:

@@ -218,7 +218,13 @@ def _attitude_numbers(found: DataflashOverview, ekf: str) -> list[int]:
     None where the log is silent.
     """
     kind = found.parameters.get("AHRS_EKF_TYPE")
-    told = _DCM if found.parameters.get("AHRS_EKF_USE") == 0.0 else None if kind is None else int(kind)
+    told = (
+        _DCM
+        if found.parameters.get("AHRS_EKF_USE") == 0.0
+        else None
+        if kind is None or not math.isfinite(kind)
+        else int(kind)
+    )
     logged = set(found.attitude_by.values.tolist())
     if logged:
         return sorted(logged, key=lambda one: (one == told, one))

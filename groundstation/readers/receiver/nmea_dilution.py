@@ -49,11 +49,15 @@ def dilution(epochs: SentenceEpochs, tally: StreamTally) -> Columns:
 
 
 def _impossible(stated: Columns) -> BoolArray:
-    """Tell where PDOP is less than HDOP and VDOP together, rounding allowed for."""
+    """Tell where PDOP is less than HDOP and VDOP together, rounding allowed for.
+
+    One number for all three, such as 50.0, is the sign of a receiver without a fix.
+    """
     pdop, hdop, vdop = (stated[name] for name in _NAMES)
     told = np.logical_and.reduce([_is_told(one) for one in (pdop, hdop, vdop)])
     least = np.hypot(np.maximum(hdop.values - _ROUNDED, 0.0), np.maximum(vdop.values - _ROUNDED, 0.0))
-    return np.asarray(told & (pdop.values + _ROUNDED < least))
+    is_sign = (pdop.values == hdop.values) & (hdop.values == vdop.values)
+    return np.asarray(told & ~is_sign & (pdop.values + _ROUNDED < least))
 
 
 def _is_told(column: Column) -> BoolArray:
