@@ -30,7 +30,13 @@ ASPECTS, HALF_ASPECTS = (1.95, 2.15), (0.88, 1.05)  # of the frame of a map alon
 MOST_MODES, MOST_GNSS_STATES = 12, 8
 LANE_MM = 4.6
 STATE_ROLES: dict[str, Role] = {"armed": "bad", "on the ground": "series 6"}
-GNSS_ROLES: dict[str, Role] = {"good": "answer", "integrity lost": "bad", "no GNSS": "bad", "not logged": "faint"}
+GNSS_ROLES: dict[str, Role] = {
+    "good": "answer",
+    "integrity lost": "bad",
+    "no fix": "bad",
+    "no GNSS": "bad",
+    "not logged": "faint",
+}
 
 
 def track_map(results: FlightResults) -> Plot | None:
