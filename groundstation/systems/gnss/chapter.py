@@ -356,7 +356,7 @@ def _missing(answer: GnssReception, places: GnssMissing | None) -> Part | None:
         for at in longest
     ]
     heads = (Head("Receiver"), Head("Last row before"), Head("Next row"), Head("Epochs", True))
-    counts = "; ".join(f"{one.topic}: {missing_of(one)}" for one in answer.receivers if one.missed_epochs)
+    counts = "; ".join(f"{missing_of(one)} ({one.topic})" for one in answer.receivers if one.missed_epochs)
     caption = f"{with_full_stop(counts)} {_most(len(places.epochs), 'longest')}".strip()
     return Grid("Missing epochs", heads, told, caption, ("gnss_missing",))
 
