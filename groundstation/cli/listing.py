@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.base.words import counted
 from groundstation.cli.application import DATA_LOST, DONE, FAILED
-from groundstation.cli.lines import LONGEST, shortened, tell_errors
+from groundstation.cli.lines import LONGEST, STATES, shortened, tell_errors
 from groundstation.cli.printing import totals
 from groundstation.cli.text import as_json, printable, say, tell
+from groundstation.pipeline.one_flight.outcome import loss_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -60,12 +61,12 @@ def describe_listed(
 
 
 def summary_of(found: "Description") -> str:
-    """Return in a line what a log is: format, span, topics and rows."""
+    """Return in a line what a log is: format, span, topics, rows and losses."""
     facts = found.facts
     span = " to ".join(facts[key] for key in ("first sample", "last sample") if key in facts)
     rows = sum(topic.rows or 0 for topic in found.topics)
     size = f"{counted(len(found.topics), 'topic')}, {counted(rows, 'row')}" if found.topics else "no records"
-    lost = "data lost" if found.has_lost_data else ""
+    lost = (loss_of(found.findings) or STATES["data_lost"]) if found.has_lost_data else ""
     return "  ".join(filter(None, (facts.get("format", ""), span, size, lost)))
 
 
