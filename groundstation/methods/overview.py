@@ -15,7 +15,7 @@ from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.signals import EVENT_SEPARATOR, topics_of_kind
 from groundstation.results.arrays.flight import GapRows, GnssLanes, LedgerRows, Overview, PhaseSpans, StateLanes
 from groundstation.results.figures import FigureData
-from groundstation.results.flight import KIND_OF_VEHICLE, PHASES_BY, WHY_THAT_VEHICLE
+from groundstation.results.flight import ALTITUDE_DATUM, KIND_OF_VEHICLE, PHASES_BY, WHY_THAT_VEHICLE
 from groundstation.tables.phases import Phases
 from groundstation.tables.sources import FIX_FIELDS, sources_of_kind
 from groundstation.tables.table import Flight, Table
@@ -37,6 +37,7 @@ ALSO = (
     ("height_above_airfield_m", "baro", ("altitude_m", "pressure_altitude_m")),
 )
 NO_GNSS, NO_FIX, NOT_LOGGED = "no GNSS", "no fix", "not logged"
+ALTITUDES = {"altitude_msl_m": "MSL", "altitude_ellipsoid_m": "ellipsoid"}  # the first that is logged is drawn
 WITHOUT_DOP = "DOP not logged"
 MODE = "mode "  # what the names of events that change the flight mode begin with
 
@@ -136,9 +137,8 @@ def overview(flight: Flight, true_heading_deg: NDArray[np.float64] | None, ins_t
     The times are of INS or of the barometer where there is no GNSS. Position, altitude, ground speed, climb, heading
     and track are always there; the columns of :data:`ALSO` where they are known.
     """
-    gnss = first_of_kind(flight, "gnss", "latitude_deg", "longitude_deg")
-    base = gnss or first_of_kind(flight, "ins", "latitude_deg", "longitude_deg") or ins_topic
-    base = base or first_of_kind(flight, "ins") or first_of_kind(flight, "baro")
+    gnss, placed = _with_places(flight)
+    base = placed or ins_topic or first_of_kind(flight, "ins") or first_of_kind(flight, "baro")
     if base is None or not len(flight[base]):
         return None
     every = flight[base]
@@ -188,9 +188,21 @@ def ground_speed(table: Table) -> NDArray[np.float64]:
     return table.values("ground_speed_mps")
 
 
+def _with_places(flight: Flight) -> tuple[str | None, str | None]:
+    """Return the GNSS with places, and the topic whose places are drawn: that one, else an INS."""
+    gnss = first_of_kind(flight, "gnss", "latitude_deg", "longitude_deg")
+    return gnss, gnss or first_of_kind(flight, "ins", "latitude_deg", "longitude_deg")
+
+
+def altitude_facts(flight: Flight) -> dict[str, str]:
+    """Return what the altitude of the overview is above, as metadata: ``MSL`` or ``ellipsoid``."""
+    _, topic = _with_places(flight)
+    known = () if topic is None else tuple(name for name in ALTITUDES if flight[topic].has(name))
+    return {ALTITUDE_DATUM: ALTITUDES[known[0]]} if known else {}
+
+
 def _altitude(table: Table) -> NDArray[np.float64]:
-    name = "altitude_msl_m" if table.has("altitude_msl_m") else "altitude_ellipsoid_m"
-    return table.values(name)
+    return table.values(next((name for name in ALTITUDES if table.has(name)), "altitude_msl_m"))
 
 
 def _track(table: Table) -> NDArray[np.float64]:

@@ -19,7 +19,7 @@ from groundstation.plots.scales import MARGIN
 from groundstation.results.arrays.flight import GnssLanes, Overview, PhaseSpans, StateLanes
 from groundstation.results.arrays.typed import Flags
 from groundstation.results.corrected_position import CorrectedPosition, corrected_position
-from groundstation.results.flight import FlightResults
+from groundstation.results.flight import ALTITUDE_DATUM, FlightResults
 from groundstation.results.roles import OnTaxi
 
 SMALLEST_TAXI_M = 10.0  # less is no taxi worth enlarging: a receiver at rest, or a start by hand
@@ -165,6 +165,12 @@ def _at_least(values: Floats, first: int) -> tuple[float, float]:
     return min(float(known.min()), values[first] - half), max(float(known.max()), values[first] + half)
 
 
+def altitude_name_of(results: FlightResults) -> str:
+    """Return the name of the altitude of the overview, with its datum where the run found one."""
+    datum = results.metadata.get(ALTITUDE_DATUM, "")
+    return {"MSL": "altitude MSL", "ellipsoid": "altitude above ellipsoid"}.get(datum, "altitude")
+
+
 def profile(results: FlightResults) -> Plot | None:
     """Return altitude and ground speed over time, shaded by phase, above the state of GNSS."""
     data = results.rows_of(Overview)
@@ -172,7 +178,7 @@ def profile(results: FlightResults) -> Plot | None:
         return None
     phases, gnss = results.rows_of(PhaseSpans), results.rows_of(GnssLanes)
     altitude, altitude_name = _first_known(
-        (data.altitude_m, "altitude"),
+        (data.altitude_m, altitude_name_of(results)),
         (data.pressure_altitude_m, "pressure altitude"),
         (data.height_above_airfield_m, "height above airfield"),
     )
