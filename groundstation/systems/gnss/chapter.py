@@ -102,7 +102,7 @@ def _claim(answer: GnssReception) -> Claim:
     if stood is not None and not stood.is_held and not stood.is_coarse:
         kind = name_of(stood.state) if len(main.fixes) > 1 else ""
         claimed = "" if stood.claimed_m is None else f"{length_text(stood.claimed_m)} claimed"
-        told.append(("Scatter", length_text(stood.scatter_m), ", ".join(filter(None, (kind, claimed)))))
+        told.append(("Scatter", length_text(stood.scatter_m), ", ".join(filter(None, ("horizontal σ", kind, claimed)))))
     figures = tuple(one for one in told if one[1] != "—")
     above = answer.against
     reasons = [reason for reason in answer.reasons if reason != above]
