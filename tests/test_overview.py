@@ -107,7 +107,7 @@ def test_gnss_without_a_fix_keeps_its_rows() -> None:
     ("fields", "datum", "name"),
     [
         (("altitude_msl_m", "altitude_ellipsoid_m"), "MSL", "altitude MSL"),
-        (("altitude_ellipsoid_m",), "ellipsoid", "altitude above ellipsoid"),
+        (("altitude_ellipsoid_m",), "ellipsoid", "ellipsoid height"),
         ((), None, "altitude"),
     ],
 )

@@ -96,10 +96,9 @@ def gnss_lanes(flight: Flight, geometry_limit: float) -> GnssLanes | None:
 
 def _has_fix(table: Table) -> BoolArray:
     """Tell which rows of a receiver have a place or a motion, and no word that they have no fix."""
-    known = np.zeros(len(table), dtype=bool)
-    for field in FIX_FIELDS:
-        known |= table.valid(field)
-    return known & (table.text("fix") != "none")
+    known = table.text("fix") != "none"
+    known &= np.any([table.valid(field) for field in FIX_FIELDS], axis=0)
+    return np.asarray(known, dtype=bool)
 
 
 def _with_ends_of_pauses(

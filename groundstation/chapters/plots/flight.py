@@ -168,7 +168,7 @@ def _at_least(values: Floats, first: int) -> tuple[float, float]:
 def altitude_name_of(results: FlightResults) -> str:
     """Return the name of the altitude of the overview, with its datum where the run found one."""
     datum = results.metadata.get(ALTITUDE_DATUM, "")
-    return {"MSL": "altitude MSL", "ellipsoid": "altitude above ellipsoid"}.get(datum, "altitude")
+    return {"MSL": "altitude MSL", "ellipsoid": "ellipsoid height"}.get(datum, "altitude")
 
 
 def profile(results: FlightResults) -> Plot | None:
