@@ -93,6 +93,6 @@ def _advice(results: FlightResults, chapters: Chapters) -> Iterator[Advice]:
 
 
 def _on_loss(results: FlightResults) -> Iterator[Advice]:
-    """Yield what to check of a log with losses; nothing where it ends in the midst of a record alone."""
+    """Yield what to check of a log with losses; none where it ends in a record alone."""
     if results.status != "ok" and not results.ledger.is_in_midst:
         yield Advice("Check", CUT if results.ledger.loss == END_CUT else LOST, "")

@@ -95,7 +95,7 @@ def gnss_lanes(flight: Flight, geometry_limit: float) -> GnssLanes | None:
 
 
 def _has_fix(table: Table) -> BoolArray:
-    """Tell which rows of a receiver have a place or a motion, and no word that they have no fix."""
+    """Tell which rows of a receiver have a place or a motion, and do not deny a fix."""
     known = table.text("fix") != "none"
     known &= np.any([table.valid(field) for field in FIX_FIELDS], axis=0)
     return np.asarray(known, dtype=bool)
@@ -188,13 +188,13 @@ def ground_speed(table: Table) -> NDArray[np.float64]:
 
 
 def _with_places(flight: Flight) -> tuple[str | None, str | None]:
-    """Return the GNSS with places, and the topic whose places are drawn: that one, else an INS."""
+    """Return the GNSS with places, and the topic to draw: that one, else an INS."""
     gnss = first_of_kind(flight, "gnss", "latitude_deg", "longitude_deg")
     return gnss, gnss or first_of_kind(flight, "ins", "latitude_deg", "longitude_deg")
 
 
 def altitude_facts(flight: Flight) -> dict[str, str]:
-    """Return what the altitude of the overview is above, as metadata: ``MSL`` or ``ellipsoid``."""
+    """Return the datum of the altitude of the overview, ``MSL`` or ``ellipsoid``."""
     _, topic = _with_places(flight)
     known = () if topic is None else tuple(name for name in ALTITUDES if flight[topic].has(name))
     return {ALTITUDE_DATUM: ALTITUDES[known[0]]} if known else {}

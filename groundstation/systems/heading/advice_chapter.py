@@ -64,7 +64,7 @@ def _on_proof(results: FlightResults) -> Advice:
 
 
 def _has_no_wheels(results: FlightResults) -> bool:
-    """Tell whether it set down without rolling, or has the firmware of a copter: no taxi proves a heading."""
+    """Tell whether it set down without rolling, or is a copter: it has no taxi."""
     firmware = f"{results.metadata.get('vehicle', '')} {results.metadata.get('firmware', '')}".lower()
     return "copter" in firmware or any(WITHOUT_ROLLING in one.reason for one in results.not_assessable)
 

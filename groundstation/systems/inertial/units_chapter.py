@@ -104,7 +104,7 @@ def _table(answer: UnitsResult) -> Grid:
 
 
 def _sources(results: FlightResults, answer: UnitsResult) -> Facts | None:
-    """Return the messages or words that feed each unit, as the reader tells them; None where it tells none."""
+    """Return the messages or words that feed each unit; None where none are told."""
     told = {one.topic: one.text for one in results.findings if one.code == MAPPED}
     pairs = [
         (unit.topic, told[unit.topic].removeprefix(f"{unit.topic} from "), "")
