@@ -2,16 +2,20 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from groundstation.base.clock import StepEntry
 from groundstation.base.failures import Failure
+from groundstation.base.findings import Finding
 from groundstation.cli import completion
 from groundstation.cli.lines import LONGEST, Lines, line_of
+from groundstation.cli.listing import summary_of
 from groundstation.pipeline.one_flight.line import line_of_results
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event
+from groundstation.pipeline.verbs.describe import Description
 from groundstation.systems import systems
 from tests.conftest import SAMPLES
 from tests.report_example import example
@@ -33,6 +37,20 @@ def test_a_flight_is_told_as_it_ends_and_once(capsys: pytest.CaptureFixture[str]
     assert capsys.readouterr().out == "more/a.csv  reject: +2 deg  data lost, finished before  A_2\n"
     cut = Outcome("b.csv", "data_lost", "reject: +2 deg", flight_id="A_3", loss="end cut off")
     assert line_of(cut) == "reject: +2 deg  end cut off  A_3"
+
+
+def test_a_list_of_logs_says_that_the_end_alone_is_cut_off() -> None:
+    cut = Finding("warn", "data.truncated", "bytes of a frame that the end of the file cuts off: 41")
+    corrupt = Finding("warn", "data.corrupt", "bytes that belong to no record: 7")
+    told = [
+        described({"format": "receiver"}, (), findings, has_lost_data=bool(findings))
+        for findings in ((), (cut,), (cut, corrupt))
+    ]
+    assert told == [f"receiver  no records{tail}" for tail in ("", "  end cut off", "  data lost")]
+
+
+def described(*facts: Any, **more: Any) -> str:
+    return summary_of(Description(*facts, **more))
 
 
 def test_what_is_learned_later_is_told_alone(capsys: pytest.CaptureFixture[str]) -> None:

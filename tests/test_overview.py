@@ -5,11 +5,14 @@ import pytest
 
 from groundstation.base.findings import Finding
 from groundstation.base.records import Column
-from groundstation.methods.overview import overview, state_lanes
+from groundstation.chapters.plots.flight import altitude_name_of
+from groundstation.methods.overview import altitude_facts, overview, state_lanes
 from groundstation.results.figures import FigureData
+from groundstation.results.flight import ALTITUDE_DATUM
 from groundstation.results.grouped_findings import grouped
 from groundstation.systems.heading.advice_chapter import WHAT_IT_NEEDS, explained
 from groundstation.tables.table import Flight, Table
+from tests.report_example import example
 from tests.viewer_example import START_NS, table
 
 
@@ -98,6 +101,23 @@ def test_gnss_without_a_fix_keeps_its_rows() -> None:
     figure = overview(flight_of(table("gnss", time_s, **position)), None, None)
     assert figure is not None and figure["time_s"][0] == 0.0
     assert (np.isfinite(figure["latitude_deg"]) == has_fix).all()
+
+
+@pytest.mark.parametrize(
+    ("fields", "datum", "name"),
+    [
+        (("altitude_msl_m", "altitude_ellipsoid_m"), "MSL", "altitude MSL"),
+        (("altitude_ellipsoid_m",), "ellipsoid", "ellipsoid height"),
+        ((), None, "altitude"),
+    ],
+)
+def test_the_altitude_of_the_overview_names_its_datum(fields: tuple[str, ...], datum: str | None, name: str) -> None:
+    """The geoid is up to 100 m from the ellipsoid: an altitude without its datum cannot be held against a chart."""
+    time_s = np.arange(0.0, 20.0, 0.2)
+    columns = {one: Column(np.full(100, 40.0)) for one in ("latitude_deg", "longitude_deg", *fields)}
+    facts = altitude_facts(flight_of(table("gnss", time_s, **columns)))
+    assert facts.get(ALTITUDE_DATUM) == datum
+    assert altitude_name_of(example(metadata=facts)) == name
 
 
 def test_modes_arming_and_ground_contact_are_lanes() -> None:

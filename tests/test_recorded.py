@@ -150,6 +150,14 @@ def test_the_length_is_that_of_the_page_to_the_millisecond_where_it_is_short() -
     assert dict(front(longer, systems().chapters).pairs)["Duration"] == "0:10 min:s"
 
 
+def test_a_cut_end_of_bus_words_is_no_fault_of_the_recorder() -> None:
+    words = Ledger(topics={"raw.bus.1553.4": topic(None, 0.3, "word")})
+    cut = cut_at_its_end("packet that the end of the file cuts off")
+    told = told_advice(replace(cut, ledger=replace(cut.ledger, topics=words.topics)))
+    assert "--icd" in told and "that the log was copied whole: its end is cut off" in told
+    assert "the recorder" not in told
+
+
 def test_bus_words_without_an_icd_say_what_names_them() -> None:
     """The line and the advice said "messages without navigation" and to record what the buses may well carry."""
     words = {f"raw.bus.{name}": topic(None, 0.3, "word") for name in ("1553.4", "429.7")}

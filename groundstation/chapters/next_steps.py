@@ -72,8 +72,7 @@ def _advice(results: FlightResults, chapters: Chapters) -> Iterator[Advice]:
     """Yield the advice, the most pressing first."""
     if unnamed_buses(results.ledger):  # nobody knows what they lack
         yield Advice("Check", UNNAMED, "")
-        if results.status != "ok":
-            yield Advice("Check", LOST, "")
+        yield from _on_loss(results)
         return
     given = [advice for one in chapters.advisers for advice in one.advise(results)]
     yield from (advice for advice in given if advice.is_danger)
@@ -90,5 +89,10 @@ def _advice(results: FlightResults, chapters: Chapters) -> Iterator[Advice]:
     for topic in dict.fromkeys(one.topic for one in results.findings if one.code == CONTRADICTION):
         yield Advice("Check", f"signs, units and axes of {topic}: they contradict each other, a profile turns them", "")
     yield from (advice for advice in given if not advice.is_pressing)
+    yield from _on_loss(results)
+
+
+def _on_loss(results: FlightResults) -> Iterator[Advice]:
+    """Yield what to check of a log with losses; none where it ends in a record alone."""
     if results.status != "ok" and not results.ledger.is_in_midst:
         yield Advice("Check", CUT if results.ledger.loss == END_CUT else LOST, "")

@@ -9,7 +9,7 @@ from groundstation.chapters.wording import ABSENT, clean, number
 from groundstation.results.flight import FlightResults, Source
 
 LONG_LISTS = ("parameter.", "units.", "together")  # of autopilot logs, hundreds of them; a chapter tells the last
-TOLD = ("derived.", "vehicle.", "phases.")  # by a finding, by the overview
+TOLD = ("derived.", "vehicle.", "phases.", "altitude.")  # by a finding, by the overview
 ON_TOP = ("aircraft", "flight", "start_utc")  # of the page
 MOST_METADATA = 8
 REST = "More metadata in summary.json."

@@ -61,7 +61,7 @@ def describe_listed(
 
 
 def summary_of(found: "Description") -> str:
-    """Return in a line what a log is: format, span, topics and rows."""
+    """Return in a line what a log is: format, span, topics, rows and losses."""
     facts = found.facts
     span = " to ".join(facts[key] for key in ("first sample", "last sample") if key in facts)
     rows = sum(topic.rows or 0 for topic in found.topics)

@@ -95,15 +95,15 @@ def _times(ledger: LedgerCounts) -> Iterator[Finding]:
         rows = sum(topic.rows for topic in ledger.topics)
         many = ledger.thresholds.findings.missing_times_share * rows
         severity: Severity = "warn" if clock.missing_times > many else "info"
-        text = f"{counted(clock.missing_times, 'record')} without a time: placed by their neighbours"
+        text = f"{counted(clock.missing_times, 'record')} without a time: placed by the records around"
         yield Finding(severity, "clock.missing_times", text, count=clock.missing_times)
     if clock.implausible_times:
-        text = f"{counted(clock.implausible_times, 'record')} with an impossible time: placed by their neighbours"
+        text = f"{counted(clock.implausible_times, 'record')} with an impossible time: placed by the records around"
         yield Finding("warn", "clock.implausible_times", text, count=clock.implausible_times)
     if clock.stale_times:
         text = (
             f"{counted(clock.stale_times, 'record')} with the time of an earlier publication (the newest value when "
-            "the log began, or a topic whose time does not advance): placed by their neighbours"
+            "the log began, or a topic whose time does not advance): placed by the records around"
         )
         yield Finding("info", "clock.stale_times", text, count=clock.stale_times)
 

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from groundstation.base.gaps import Gaps, logged_ns
 from groundstation.base.ledger import Ledger
 from groundstation.base.nearest import nearest_rows
-from groundstation.base.records import Int64Array
+from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.signals import EVENT_SEPARATOR, topics_of_kind
 from groundstation.results.arrays.flight import GapRows, GnssLanes, LedgerRows, Overview, PhaseSpans, StateLanes
 from groundstation.results.figures import FigureData
-from groundstation.results.flight import KIND_OF_VEHICLE, PHASES_BY, WHY_THAT_VEHICLE
+from groundstation.results.flight import ALTITUDE_DATUM, KIND_OF_VEHICLE, PHASES_BY, WHY_THAT_VEHICLE
 from groundstation.tables.phases import Phases
-from groundstation.tables.sources import sources_of_kind
+from groundstation.tables.sources import FIX_FIELDS, sources_of_kind
 from groundstation.tables.table import Flight, Table
 from groundstation.tables.wheels import contact_of
 
@@ -36,7 +36,9 @@ ALSO = (
     ("pressure_altitude_m", "baro", ("altitude_m",)),
     ("height_above_airfield_m", "baro", ("altitude_m", "pressure_altitude_m")),
 )
-NO_GNSS, NOT_LOGGED = "no GNSS", "not logged"
+NO_GNSS, NO_FIX, NOT_LOGGED = "no GNSS", "no fix", "not logged"
+ALTITUDES = {"altitude_msl_m": "MSL", "altitude_ellipsoid_m": "ellipsoid"}  # the first that is logged is drawn
+WITHOUT_DOP = "DOP not logged"
 MODE = "mode "  # what the names of events that change the flight mode begin with
 
 
@@ -59,20 +61,22 @@ def runs_of(states: NDArray[np.str_], time_s: NDArray[np.float64], end_s: float)
 def gnss_lanes(flight: Flight, geometry_limit: float) -> GnssLanes | None:
     """Return the state of GNSS over the flight.
 
-    Good, geometry above the limit, integrity lost, no geometry factor, no GNSS; not logged in a pause of the log.
+    Good, dilution of precision above the limit or not logged, integrity lost, no fix, no GNSS; not logged in a pause
+    of the log.
     """
     topic = first_of_kind(flight, "gnss", "velocity_north_mps") or first_of_kind(flight, "gnss", "latitude_deg")
     if topic is None:
         return None
     table = flight[topic]
     name = next((factor for factor in ("gdop", "pdop", "hdop") if table.has(factor)), None)
-    states = np.full(len(table), "good" if name else "no geometry factor", dtype="U24")
+    states = np.full(len(table), "good" if name else WITHOUT_DOP, dtype="U24")
     if name:
         factor = table.values(name)
-        states[~np.isfinite(factor)] = "no geometry factor"
+        states[~np.isfinite(factor)] = WITHOUT_DOP
         states[factor > geometry_limit] = f"{name} > {geometry_limit:g}"
     if table.has("integrity_ok"):
         states[table.values("integrity_ok") == 0.0] = "integrity lost"
+    states[~_has_fix(table)] = NO_FIX
     time_ns, states = _with_ends_of_pauses(table.time_ns, states, flight)
     time_s, step_s = flight.seconds(time_ns), np.diff(flight.seconds(logged_ns(time_ns, flight.pauses)))
     if len(step_s):
@@ -88,6 +92,13 @@ def gnss_lanes(flight: Flight, geometry_limit: float) -> GnssLanes | None:
             state=np.r_[lanes.state, np.array([NO_GNSS])],
         )
     return _paused(lanes, flight)
+
+
+def _has_fix(table: Table) -> BoolArray:
+    """Tell which rows of a receiver have a place or a motion, and do not deny a fix."""
+    known = table.text("fix") != "none"
+    known &= np.any([table.valid(field) for field in FIX_FIELDS], axis=0)
+    return np.asarray(known, dtype=bool)
 
 
 def _with_ends_of_pauses(
@@ -125,9 +136,8 @@ def overview(flight: Flight, true_heading_deg: NDArray[np.float64] | None, ins_t
     The times are of INS or of the barometer where there is no GNSS. Position, altitude, ground speed, climb, heading
     and track are always there; the columns of :data:`ALSO` where they are known.
     """
-    gnss = first_of_kind(flight, "gnss", "latitude_deg", "longitude_deg")
-    base = gnss or first_of_kind(flight, "ins", "latitude_deg", "longitude_deg") or ins_topic
-    base = base or first_of_kind(flight, "ins") or first_of_kind(flight, "baro")
+    gnss, placed = _with_places(flight)
+    base = placed or ins_topic or first_of_kind(flight, "ins") or first_of_kind(flight, "baro")
     if base is None or not len(flight[base]):
         return None
     every = flight[base]
@@ -177,9 +187,21 @@ def ground_speed(table: Table) -> NDArray[np.float64]:
     return table.values("ground_speed_mps")
 
 
+def _with_places(flight: Flight) -> tuple[str | None, str | None]:
+    """Return the GNSS with places, and the topic to draw: that one, else an INS."""
+    gnss = first_of_kind(flight, "gnss", "latitude_deg", "longitude_deg")
+    return gnss, gnss or first_of_kind(flight, "ins", "latitude_deg", "longitude_deg")
+
+
+def altitude_facts(flight: Flight) -> dict[str, str]:
+    """Return the datum of the altitude of the overview, ``MSL`` or ``ellipsoid``."""
+    _, topic = _with_places(flight)
+    known = () if topic is None else tuple(name for name in ALTITUDES if flight[topic].has(name))
+    return {ALTITUDE_DATUM: ALTITUDES[known[0]]} if known else {}
+
+
 def _altitude(table: Table) -> NDArray[np.float64]:
-    name = "altitude_msl_m" if table.has("altitude_msl_m") else "altitude_ellipsoid_m"
-    return table.values(name)
+    return table.values(next((name for name in ALTITUDES if table.has(name)), "altitude_msl_m"))
 
 
 def _track(table: Table) -> NDArray[np.float64]:

@@ -46,7 +46,9 @@ class Source:
 KIND_OF_VEHICLE = "vehicle.kind"  # keys of the metadata: rolls, flies, walks, floats or unknown
 WHY_THAT_VEHICLE, PHASES_BY = "vehicle.why", "phases.method"
 SIMULATED_BY = "vehicle.simulated"  # what tells that a simulator made the log
-FOUND_BY_RUN = (KIND_OF_VEHICLE, WHY_THAT_VEHICLE, PHASES_BY, SIMULATED_BY)  # facts that no log has: a run adds them
+ALTITUDE_DATUM = "altitude.datum"  # what the altitude of the overview is above: MSL or ellipsoid
+# Facts that no log has: a run adds them.
+FOUND_BY_RUN = (KIND_OF_VEHICLE, WHY_THAT_VEHICLE, PHASES_BY, SIMULATED_BY, ALTITUDE_DATUM)
 NAT_NS = np.iinfo(np.int64).min  # numpy's "not a time"
 UTC_OF = {"time_s": "utc", "start_s": "start_utc", "end_s": "end_utc"}  # columns of flight seconds, and their UTC
 

@@ -15,6 +15,7 @@ Bound = tuple[float | None, float | None]  # lowest and highest value with which
 STORED_STEP = 1e-6  # limits in summary.json are rounded to it
 NOT_PROVEN = "ground contact not proven for"  # so many epochs
 NO_CONTACT = "no GNSS epoch with ground contact proven"
+WITHOUT_ROLLING = "without rolling"  # how a vehicle without wheels sets down
 
 
 @dataclass(frozen=True)

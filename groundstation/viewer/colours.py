@@ -68,8 +68,9 @@ PHASES: Final[dict[str, Colour]] = {
 }
 GNSS_STATES: Final[dict[str, Colour]] = {
     "good": GREEN,
-    "no geometry factor": GREY,
+    "DOP not logged": GREY,
     "integrity lost": VERMILION,
+    "no fix": VERMILION,
     "no GNSS": DIM,
     "not logged": LIGHT,
 }

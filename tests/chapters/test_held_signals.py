@@ -87,6 +87,20 @@ def test_a_log_in_the_air_with_weight_on_wheels_is_asked_for_its_ground_run() ->
     assert with_it["Record"].endswith(": the ground run too (by weight on wheels this log holds none).")
 
 
+@pytest.mark.parametrize(
+    ("landed", "metadata"),
+    [
+        ("set down between 2:50 and 3:01 without rolling: no approach to a runway", {}),
+        ("no landing in the log", {"firmware": "ArduCopter V3.6.7"}),
+    ],
+)
+def test_what_has_no_wheels_is_not_asked_for_weight_on_wheels(landed: str, metadata: dict[str, str]) -> None:
+    missing = (NotAssessable("heading", NO_CONTACT), NotAssessable("landing", landed))
+    assert "Record" not in told(holding("gnss.gdop", not_assessable=missing, metadata=metadata))
+    rolls = (missing[0], NotAssessable("landing", "no landing in the log"))
+    assert "weight on wheels" in told(holding("gnss.gdop", not_assessable=rolls))["Record"]
+
+
 def test_a_gate_of_a_signal_that_is_there_asks_to_check_it() -> None:
     gate = Gate("geometry", "", 0.4, 0.9, "", "failed", sense="at_least")
     results = example(heading_result(verdict="reject", gates=(gate,)), not_assessable=())

@@ -548,6 +548,15 @@ def test_deviations_of_the_flights_stand_beside_each_other(tmp_path: Path) -> No
     assert "Magnetic deviation by aircraft" not in page_of(tmp_path, fleet_of(10)).text
 
 
+def test_a_log_that_is_cut_or_damaged_is_not_said_to_have_lost_data() -> None:
+    """The flag of the fleet is the same for a cut end and for damage: the remark says no more than it knows."""
+    fleet = fleet_of(2, has_lost_data=[True, False])
+    told = [
+        [mark.text for mark in flights.remarks_of(fleet).get(name, ())] for name in fleet.flights["flight_id"].tolist()
+    ]
+    assert "log cut or damaged" in told[0] and "log cut or damaged" not in told[1]
+
+
 def test_a_flight_with_an_ins_off_is_remarked_and_counted(tmp_path: Path) -> None:
     columns = {"units_verdict": ["off", "one_of", "agree", ""], "units_off": ["ins.1", "ins, ins.2", "", ""]}
     fleet = fleet_of(4, **columns)

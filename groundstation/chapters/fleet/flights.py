@@ -227,7 +227,7 @@ def remarks_of(fleet: FleetResults) -> dict[str, list[Mark]]:
     for row in np.flatnonzero(flights["findings_fail"] > 0):
         note(flights["flight_id"][row], "warn", plural(int(flights["findings_fail"][row]), "severe finding"))
     for row in np.flatnonzero(flights["has_lost_data"]):
-        note(flights["flight_id"][row], "plain", "data lost")
+        note(flights["flight_id"][row], "plain", "log cut or damaged")
     return found
 
 

@@ -19,7 +19,7 @@ from groundstation.plots.scales import MARGIN
 from groundstation.results.arrays.flight import GnssLanes, Overview, PhaseSpans, StateLanes
 from groundstation.results.arrays.typed import Flags
 from groundstation.results.corrected_position import CorrectedPosition, corrected_position
-from groundstation.results.flight import FlightResults
+from groundstation.results.flight import ALTITUDE_DATUM, FlightResults
 from groundstation.results.roles import OnTaxi
 
 SMALLEST_TAXI_M = 10.0  # less is no taxi worth enlarging: a receiver at rest, or a start by hand
@@ -30,7 +30,13 @@ ASPECTS, HALF_ASPECTS = (1.95, 2.15), (0.88, 1.05)  # of the frame of a map alon
 MOST_MODES, MOST_GNSS_STATES = 12, 8
 LANE_MM = 4.6
 STATE_ROLES: dict[str, Role] = {"armed": "bad", "on the ground": "series 6"}
-GNSS_ROLES: dict[str, Role] = {"good": "answer", "integrity lost": "bad", "no GNSS": "bad", "not logged": "faint"}
+GNSS_ROLES: dict[str, Role] = {
+    "good": "answer",
+    "integrity lost": "bad",
+    "no fix": "bad",
+    "no GNSS": "bad",
+    "not logged": "faint",
+}
 
 
 def track_map(results: FlightResults) -> Plot | None:
@@ -159,6 +165,12 @@ def _at_least(values: Floats, first: int) -> tuple[float, float]:
     return min(float(known.min()), values[first] - half), max(float(known.max()), values[first] + half)
 
 
+def altitude_name_of(results: FlightResults) -> str:
+    """Return the name of the altitude of the overview, with its datum where the run found one."""
+    datum = results.metadata.get(ALTITUDE_DATUM, "")
+    return {"MSL": "altitude MSL", "ellipsoid": "ellipsoid height"}.get(datum, "altitude")
+
+
 def profile(results: FlightResults) -> Plot | None:
     """Return altitude and ground speed over time, shaded by phase, above the state of GNSS."""
     data = results.rows_of(Overview)
@@ -166,7 +178,7 @@ def profile(results: FlightResults) -> Plot | None:
         return None
     phases, gnss = results.rows_of(PhaseSpans), results.rows_of(GnssLanes)
     altitude, altitude_name = _first_known(
-        (data.altitude_m, "altitude"),
+        (data.altitude_m, altitude_name_of(results)),
         (data.pressure_altitude_m, "pressure altitude"),
         (data.height_above_airfield_m, "height above airfield"),
     )

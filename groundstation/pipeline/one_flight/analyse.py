@@ -117,7 +117,14 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
     return FlightResults(
         flight_id=given.flight_id,
         source=given.source,
-        metadata=MappingProxyType({**flight.metadata, **overview.phase_facts(known.phases), **_simulated(simulator)}),
+        metadata=MappingProxyType(
+            {
+                **flight.metadata,
+                **overview.phase_facts(known.phases),
+                **(attempt("arrays", "altitude", overview.altitude_facts, flight) or {}),
+                **_simulated(simulator),
+            }
+        ),
         start_utc_ns=flight.start_ns if flight.has_utc else None,
         duration_s=flight.duration_s,
         status=_status(given, findings),

@@ -11,10 +11,12 @@ from groundstation.base.findings import Finding, Severity
 from groundstation.base.gaps import Gaps
 from groundstation.base.ledger import DamagedSpan, Ledger
 from groundstation.base.timescales import duration_text
+from groundstation.base.words import counted
 from groundstation.systems.analysis import RestsOn
 from groundstation.tables.table import Flight
 
 SHOWN = 3
+LEAST_TOLD_S = 0.05  # a shorter span is told as a moment
 Spans = Sequence[tuple[float, float]]
 
 
@@ -33,7 +35,7 @@ def damage_finding(
     severity: Severity = "warn" if damaged else "info"
     told = [_told(entry) for entry in damaged[:SHOWN]]
     if len(damaged) > SHOWN:
-        told.append(f"{len(damaged) - SHOWN} more damaged spans")
+        told.append(counted(len(damaged) - SHOWN, "more damaged span"))
     told += gaps
     place = "+" + duration_text(damaged[0].start_s) if damaged else ""
     text = f"{subject}: uses samples in or around {'; '.join(told)}"
@@ -56,7 +58,9 @@ def _told(span: DamagedSpan) -> str:
     name = ".".join(part for part in (span.topic, span.field) if part)
     what = span.cause.replace("_", " ") + (f" of {name}" if name else "")
     where = "" if span.is_exact else "somewhere "
-    return f"{what} ({where}from +{duration_text(span.start_s)} for {span.length_s:.1f} s)"
+    start = duration_text(span.start_s)
+    when = f"from +{start} for {span.length_s:.1f} s" if span.length_s >= LEAST_TOLD_S else f"at +{start}"
+    return f"{what} ({where}{when})"
 
 
 def _gaps(use: RestsOn, flight: Flight, gaps_of: Mapping[str, Gaps]) -> list[str]:
@@ -70,5 +74,5 @@ def _gaps(use: RestsOn, flight: Flight, gaps_of: Mapping[str, Gaps]) -> list[str
         )
         if inside.any():
             count, total_s = int(inside.sum()), float(gaps.length_s[inside].sum())
-            told.append(f"{count} {'gap' if count == 1 else 'gaps'} of {topic}, {total_s:.1f} s together")
+            told.append(f"{counted(count, 'gap')} of {topic}, {total_s:.1f} s together")
     return told

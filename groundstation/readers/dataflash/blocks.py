@@ -110,7 +110,7 @@ class UnusedSpans:
         if self.cut is not None:
             start, end, name = self.cut
             what = (
-                f"bytes of a {name} record that the end of the file cuts off" if name else "bytes of a record cut off"
+                f"bytes of a record ({name}) that the end of the file cuts off" if name else "bytes of a record cut off"
             )
             yield Damage("truncated", bytes_place(start, end), end - start, what)
         if self.padding is not None:

@@ -26,8 +26,9 @@ _REFUSED = {
 }
 ASTRAY, IMPOSSIBLE_DILUTION, SAME_DILUTION, HDOPS_DIFFER = AT_ODDS
 _ODD = {
-    ASTRAY: "altitude {alt} m, geoid {sep} m above the ellipsoid in {count}, as the receiver says, and it never is "
-    f"further than {MOST_SEPARATION_M:.0f} m: no height above the sea (altitude_msl_m); their sum is kept as the one "
+    ASTRAY: "altitude {alt} m, geoid {sep} m above the ellipsoid in {count}, as the receiver says, and a geoid is "
+    f"never further than {MOST_SEPARATION_M:.0f} m from it: no height above the sea (altitude_msl_m); "
+    "their sum is kept as the one "
     "above the ellipsoid (altitude_ellipsoid_m)",
     NOT_MEASURED: "{count} simulated or entered by hand, as the receiver says: integrity_ok is false",
     IMPOSSIBLE_DILUTION: "GSA says PDOP {PDOP}, HDOP {HDOP} and VDOP {VDOP} in {count}, which cannot be, as PDOP² = "

@@ -102,7 +102,7 @@ def _claim(answer: GnssReception) -> Claim:
     if stood is not None and not stood.is_held and not stood.is_coarse:
         kind = name_of(stood.state) if len(main.fixes) > 1 else ""
         claimed = "" if stood.claimed_m is None else f"{length_text(stood.claimed_m)} claimed"
-        told.append(("Scatter", length_text(stood.scatter_m), ", ".join(filter(None, (kind, claimed)))))
+        told.append(("Scatter", length_text(stood.scatter_m), ", ".join(filter(None, ("horizontal σ", kind, claimed)))))
     figures = tuple(one for one in told if one[1] != "—")
     above = answer.against
     reasons = [reason for reason in answer.reasons if reason != above]
@@ -356,7 +356,7 @@ def _missing(answer: GnssReception, places: GnssMissing | None) -> Part | None:
         for at in longest
     ]
     heads = (Head("Receiver"), Head("Last row before"), Head("Next row"), Head("Epochs", True))
-    counts = "; ".join(f"{one.topic}: {missing_of(one)}" for one in answer.receivers if one.missed_epochs)
+    counts = "; ".join(f"{missing_of(one)} ({one.topic})" for one in answer.receivers if one.missed_epochs)
     caption = f"{with_full_stop(counts)} {_most(len(places.epochs), 'longest')}".strip()
     return Grid("Missing epochs", heads, told, caption, ("gnss_missing",))
 

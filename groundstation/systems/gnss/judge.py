@@ -145,15 +145,16 @@ def _geometry(one: GnssReceiver, rows: ReceiverRows, settings: GnssSettings) -> 
         values = rows.values(name)
         known = np.isfinite(values)
         whole_s = float(rows.held_s[known].sum())
+        when = "of the time" if rows.has_fix.all() else "of the time with a fix"
         for grade, limit, most in _limits(settings, warn, bad):
             beyond = known & (sign * values > sign * limit)
             share = float(rows.held_s[beyond].sum()) / whole_s if whole_s > 0.0 else float(beyond.any())
             if share > most:
                 side = "fewer than" if sign < 0.0 else "above"
                 text = (
-                    f"{side} {limit:g} {word} {share_text(share)} of the time"
+                    f"{side} {limit:g} {word} {share_text(share)} {when}"
                     if sign < 0.0
-                    else f"{word} {side} {limit:g} {share_text(share)} of the time"
+                    else f"{word} {side} {limit:g} {share_text(share)} {when}"
                 )
                 at_s = float(rows.time_s[np.argmax(beyond)])
                 found.append(Judged(grade, text, f"{name}_beyond", one.topic, f"at {at_s:.1f} s"))

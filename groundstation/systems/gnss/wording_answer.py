@@ -139,11 +139,11 @@ def meaning_of(motion: VelocityAgainstPosition, too_sure: float) -> str:
     if lasting is None:
         return f"{told}: the log is too short to say whether it is noise from fix to fix"
     if lasting <= claimed:
-        return f"{told}: noise from fix to fix explains it, {lasting:.2f} m/s is left over 10 s"
+        return f"{told}: noise from fix to fix explains it, means over 10 s differ by {lasting:.2f} m/s"
     beyond = "noise from fix to fix does not explain all of it"
     if lasting > too_sure * claimed:
         beyond = "neither a delay nor noise from fix to fix explains it: the velocity is worse than claimed, or drifts"
-    return f"{told}: {beyond}, {lasting:.2f} m/s is left over 10 s"
+    return f"{told}: {beyond}, means over 10 s differ by {lasting:.2f} m/s"
 
 
 def texts_text(one: ReceiverTexts) -> str:

@@ -8,7 +8,7 @@ from groundstation.chapters.chapter import Advice, Remedies
 from groundstation.chapters.held_signals import is_held
 from groundstation.chapters.wording import number, significant
 from groundstation.results.flight import KIND_OF_VEHICLE, WHY_THAT_VEHICLE, FlightResults
-from groundstation.results.gates import NO_CONTACT, NOT_PROVEN, Gate, in_plain_words
+from groundstation.results.gates import NO_CONTACT, NOT_PROVEN, WITHOUT_ROLLING, Gate, in_plain_words
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.gates_answer import (
     GATES,
@@ -49,6 +49,8 @@ def advise(results: FlightResults) -> Iterator[Advice]:
     answer = results.answer(HeadingResult)
     if answer is None:
         reason = reason_of(results, HeadingResult.analysis)
+        if _has_no_wheels(results):
+            return
         if NO_CONTACT in reason or (NOT_PROVEN in reason and _is_found_to_roll(results)):
             yield _on_proof(results)
         return
@@ -66,6 +68,12 @@ def _on_proof(results: FlightResults) -> Advice:
     if _is_found_to_roll(results):
         return Advice("Check", STATE_THE_KIND, PURPOSE)
     return Advice("Record", FROM_THE_STAND if is_held(results, WHEELS) else WHEELS, PURPOSE)
+
+
+def _has_no_wheels(results: FlightResults) -> bool:
+    """Tell whether it set down without rolling, or is a copter: it has no taxi."""
+    firmware = f"{results.metadata.get('vehicle', '')} {results.metadata.get('firmware', '')}".lower()
+    return "copter" in firmware or any(WITHOUT_ROLLING in one.reason for one in results.not_assessable)
 
 
 def _is_found_to_roll(results: FlightResults) -> bool:

@@ -156,7 +156,7 @@ def _happenings(happenings: Sequence[Happening], title: str, answer: AutopilotHe
         return None
     rows = [
         (clock(one.time_s), GRADES[one.grade], clean(one.text), "yes" if one.in_the_air else "no")
-        for one in happenings[:MOST_LISTED]
+        for one in sorted(happenings, key=lambda one: one.time_s)[:MOST_LISTED]
     ]
     more = f"The first {MOST_LISTED} of {number(len(happenings), 0)}." if len(happenings) > MOST_LISTED else ""
     heads = (Head("Time"), Head("Grade"), Head("What"), Head(capitalised(answer.judged_over)))

@@ -73,7 +73,7 @@ def compare_aided(
         gnss_topic=compared.gnss_topic,
         kind=kind[0],
         kind_reason=kind[1],
-        epochs=len(epochs),
+        epochs=int(np.count_nonzero(epochs.has_gnss)),
         gnss_seconds=seconds_covered(epochs.time_s[epochs.has_gnss], settings.outage_s),
         other_ins=tuple(name for name in topics_of_kind("ins", flight.topics()) if name != compared.ins_topic),
         differences=_differences(compared),

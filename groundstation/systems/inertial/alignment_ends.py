@@ -128,7 +128,7 @@ def shutdown_of(
         speed = None if means is None else length_of(*means)
     error, at_s, hours, rate = _terminal(compared, noise, start_s, parked, is_unaided=is_unaided)
     if error is None:
-        reason = "; ".join(filter(None, (reason, "no GNSS to compare it with")))
+        reason = "; ".join(filter(None, (reason, "not compared with GNSS")))
     elif parked is not None and at_s is not None and at_s < parked[0]:
         reason = "; ".join(filter(None, (reason, "no GNSS at the stand: the last one known")))
     first_s, end_s = (None, None) if parked is None else parked

@@ -193,7 +193,7 @@ def _result(
         kind=kind[0],
         kind_reason=kind[1],
         transition=run.model.transition,
-        epochs=len(epochs),
+        epochs=int(np.count_nonzero(epochs.has_gnss)),
         gnss_seconds=seconds_covered(epochs.time_s[epochs.has_gnss], settings.outage_s),
         north=_channel(run, visible, 0),
         east=_channel(run, visible, 1),

@@ -5,7 +5,7 @@ from typing import Any
 
 from groundstation.base.words import capitalised, listed
 from groundstation.chapters.assessed import without_answer
-from groundstation.chapters.parts import Cell, Claim, Figure, Grid, Head, Mark, Note, Part, Rank, Section, kept
+from groundstation.chapters.parts import Cell, Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, kept
 from groundstation.chapters.wording import ABSENT, clock, number, percent, typeset
 from groundstation.results.flight import FlightResults
 from groundstation.systems.inertial.units_answer import InsPair, InsUnit, Measured, UnitsResult
@@ -35,6 +35,7 @@ VERDICTS = {
     "one_of": "{}: one is off",
     "not_judged": "Not judged",
 }
+MAPPED = "reader.mapped"  # code of the finding on what feeds a topic
 SHORT_H = 120.0 / 3600.0  # of less no units are judged: it is told in seconds
 
 
@@ -48,6 +49,7 @@ def units(results: FlightResults) -> Section | None:
         Note(f"{typeset(answer.sentence)}.", tone),
         *_remarks(answer),
         _table(answer),
+        _sources(results, answer),
         _pairs(answer),
         Figure("units.radial") if any(pair.hours >= SHORT_H for pair in answer.pairs) else None,
     )
@@ -92,15 +94,24 @@ def _measured(value: Measured | None, places: int, unit: str = "", *, signed: bo
 
 
 def _table(answer: UnitsResult) -> Grid:
-    against = (
-        f"Against {answer.against_title}. " if answer.against else "No GNSS and no trajectory to hold them against. "
-    )
+    against = f"Against {answer.against_title}. " if answer.against else "Held against neither GNSS nor a trajectory. "
     caption = (
         f"{against}± is half of the 95 % interval of the measurement, left out where it rounds to nothing. "
         "A rate marked * is the growth inside the log: nothing shows when navigation began. Heading: less that of the "
         "trajectory. Clock: later (+) than the unit by which clocks are set; more than 0.05 s is taken off."
     )
     return _grid("Units", UNIT_COLUMNS, answer.units, caption)
+
+
+def _sources(results: FlightResults, answer: UnitsResult) -> Facts | None:
+    """Return the messages or words that feed each unit; None where none are told."""
+    told = {one.topic: one.text for one in results.findings if one.code == MAPPED}
+    pairs = [
+        (unit.topic, told[unit.topic].removeprefix(f"{unit.topic} from "), "")
+        for unit in answer.units
+        if told.get(unit.topic, "").startswith(f"{unit.topic} from ")
+    ]
+    return Facts("Where the units come from", pairs) if pairs else None
 
 
 def _name(unit: InsUnit) -> Cell:

@@ -8,6 +8,7 @@ import numpy as np
 
 from groundstation.base.signals import EVENT_SEPARATOR
 from groundstation.base.words import clock_text
+from groundstation.results.gates import WITHOUT_ROLLING
 from groundstation.systems.landing.evidence import SLOWEST_MPS
 from groundstation.systems.landing.finals import ON_LANDING
 from groundstation.systems.landing.path import FlightPath
@@ -35,7 +36,7 @@ def why_no_end(flight: "Flight", path: FlightPath, phases: "Phases") -> str:
     known = np.isfinite(path.ground_speed_mps)
     speed_mps = np.interp(start_s, path.time_s[known], path.ground_speed_mps[known]) if known.any() else np.inf
     if speed_mps < SLOWEST_MPS:
-        return f"set down {told} without rolling: no approach to a runway"
+        return f"set down {told} {WITHOUT_ROLLING}: no approach to a runway"
     return f"it came down {told}, where neither flight nor ground is proven: no touchdown to judge an approach by"
 
 

@@ -12,6 +12,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import DEG_PER_RAD, NS_PER_S
+from groundstation.base.words import counted
 from groundstation.methods.moving_lines import fitted_lines, window_bounds
 from groundstation.systems.magnetic.answer import DeclinationUsed
 from groundstation.systems.magnetic.flown import IN_THE_AIR
@@ -88,7 +89,9 @@ def gather_epochs(flight: Flight, topic: str, phases: Phases, settings: Magnetic
     unit = flight[topic].trusted()
     unit = _thinned(unit.take(unit.valid("magnetic_heading_deg")).unique_times())
     if len(unit) < LEAST_EPOCHS:
-        raise NotAssessableError(ANALYSIS, f"{len(unit)} s of magnetic heading, at least {LEAST_EPOCHS} needed")
+        raise NotAssessableError(
+            ANALYSIS, f"{counted(len(unit), 'epoch')} of magnetic heading, one a second: {LEAST_EPOCHS} needed"
+        )
     at_ns, heading = unit.time_ns, wrap_360(unit.values("magnetic_heading_deg"))
     time_s = flight.seconds(at_ns)
     gnss_topic, velocity = _velocity(flight, at_ns)

@@ -210,7 +210,7 @@ def _fixes(flight: Flight, topic: str, excluded_s: tuple[tuple[float, float], ..
 
 
 def _fix_count(count: int) -> str:
-    return f"{count} fix{'' if count == 1 else 'es'}"
+    return f"{counted(count, 'fix', 'fixes')}"
 
 
 def _velocity(table: Table, topic: str, notes: list[InputNote]) -> FloatArray:

@@ -16,7 +16,7 @@ from groundstation.systems.gnss.plots import PLOTS
 from groundstation.tables.table import Table
 from tests.real_logs import real_log
 from tests.report_example import example
-from tests.systems.gnss.made import answer, table, times
+from tests.systems.gnss.made import answer, motion, table, times
 from tests.told import next_steps
 
 
@@ -58,6 +58,15 @@ def test_the_page_opens_with_what_is_against_the_reception() -> None:
     good = gnss(results_of(table(times())))
     assert good is not None and good.claim is not None and good.claim.value == "100 %"
     assert good.claim.headline.startswith("Single (3D) throughout, fix never lost")
+
+
+def test_the_scatter_of_the_front_says_which_it_is() -> None:
+    time_s, rng = times(), np.random.default_rng(1)
+    place_m = motion(time_s)[0] + rng.normal(0.0, 0.5, (len(time_s), 2))
+    section = gnss(results_of(table(time_s, place_m=place_m)))
+    assert section is not None and section.claim is not None
+    (remark,) = [remark for name, _, remark in section.claim.figures if name == "Scatter"]
+    assert remark == "horizontal σ"
 
 
 def test_the_share_of_the_tile_is_of_all_the_time_and_not_of_that_after_the_first_fix() -> None:

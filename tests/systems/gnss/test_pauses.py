@@ -1,6 +1,7 @@
 """Reception over a pause of the log while disarmed: no time of the receiver, no loss, a lane of its own."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -105,6 +106,28 @@ def test_the_lane_of_the_overview_is_red_only_where_the_receiver_is_silent(
 def test_the_lane_without_a_known_pause_is_red() -> None:
     lanes = gnss_lanes(paused(is_known=False), 4.0)
     assert lanes is not None and lanes.state.tolist() == ["good", "no GNSS", "good"]
+
+
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        ({"fix": np.where(times() < 60.0, "none", "3d")}, ["no fix", "good"]),
+        (
+            dict.fromkeys(("latitude_deg", "velocity_north_mps"), np.where(times() < 60.0, np.nan, 1.0)),
+            ["no fix", "good"],
+        ),
+        ({"hdop": np.where(times() < 60.0, np.nan, 0.8)}, ["DOP not logged", "good"]),
+        ({"hdop": None, "fix": np.where(times() < 60.0, "none", "3d")}, ["no fix", "DOP not logged"]),
+        (
+            {"hdop": np.where(times() < 60.0, 99.99, 0.8), "fix": np.where(times() < 60.0, "none", "3d")},
+            ["no fix", "good"],
+        ),
+    ],
+)
+def test_a_lane_tells_no_fix_from_a_dilution_that_is_not_logged(changed: dict[str, Any], told: list[str]) -> None:
+    lanes = gnss_lanes(flight(table(times(), **changed)), 4.0)
+    assert lanes is not None and lanes.state.tolist() == told
+    assert lanes.start_s.tolist() == pytest.approx([0.0, 60.0], abs=STEP_S)
 
 
 @pytest.mark.real_log

@@ -194,6 +194,21 @@ def test_few_satellites_and_bad_geometry_are_graded_by_time() -> None:
     assert codes(table(time_s, hdop=np.where(time_s < 20.0, 4.0, 0.8)))["hdop_beyond"] == "warn"
 
 
+def test_shares_of_satellites_and_geometry_are_of_the_time_with_a_fix() -> None:
+    """Half of the time without a fix: five satellites in the half of the rest are so for 50 % of it, and it says so."""
+    time_s = times()
+    few = np.where(time_s < 0.75 * WHOLE_S, 5.0, 12.0)
+    found = reception(table(time_s, fix=np.where(time_s < 0.5 * WHOLE_S, "none", "3d"), satellites_used=few))
+    (told,) = [one.text for one in found.findings if one.code == "gnss.satellites_used_beyond"]
+    assert told == "fewer than 6 satellites 50 % of the time with a fix"
+    (whole,) = [
+        one.text
+        for one in reception(table(time_s, satellites_used=few)).findings
+        if one.code == "gnss.satellites_used_beyond"
+    ]
+    assert whole == "fewer than 6 satellites 75 % of the time"
+
+
 def test_what_is_not_logged_is_never_good() -> None:
     time_s = times()
     bare = table(time_s, fix=None, satellites_used=None, hdop=None)
@@ -348,8 +363,14 @@ def test_a_receiver_alone_tells_no_heading() -> None:
     [
         (0.05, 0.05, 0.02, None, "the difference is within the claimed σ"),
         (0.142, 0.053, 0.019, 0.131, "2.0 times the claimed σ: the delay of 0.13 s explains it, 0.05 m/s is left"),
-        (0.142, 0.14, 0.019, 0.02, "2.0 times the claimed σ: noise from fix to fix explains it, 0.02 m/s is left"),
-        (0.5, 0.5, 0.1, None, "noise from fix to fix does not explain all of it, 0.10 m/s is left over 10 s"),
+        (
+            0.142,
+            0.14,
+            0.019,
+            0.02,
+            "noise from fix to fix explains it, means over 10 s differ by 0.02",
+        ),
+        (0.5, 0.5, 0.1, None, "noise from fix to fix does not explain all of it, means over 10 s differ by 0.10 m/s"),
         (0.5, 0.5, 0.3, None, "neither a delay nor noise from fix to fix explains it"),
         (0.5, 0.5, None, None, "too short to say"),
     ],

@@ -8,11 +8,12 @@ import pytest
 from groundstation.chapters.markdown import markdown
 from groundstation.plots.marks import Curve, Lanes, Limit
 from groundstation.results.flight import FlightResults
-from groundstation.systems.health.answer import Check
+from groundstation.systems.health.answer import AutopilotHealth, Check, Happening
 from groundstation.systems.health.chapter import health
 from groundstation.systems.health.plots import PLOTS
 from groundstation.systems.health.sentence_answer import told_apart
 from tests.report_example import example
+from tests.section_contents import rows
 from tests.systems.health.made import table
 from tests.systems.health.test_px4 import TIME, answered, during, new
 
@@ -51,6 +52,16 @@ def test_the_chapter_opens_with_what_failed(results: FlightResults) -> None:
     assert section.claim.headline == section.headline == "Vibration high 0:40-1:00"
     assert section.claim.sentences[0].startswith("GNSS good, filter healthy")
     assert "Not logged" in markdown(section)
+
+
+def test_what_happened_is_listed_in_the_order_of_time(results: FlightResults) -> None:
+    """A setting that the flight contradicts is found last and belongs to the start."""
+    found = results.answer(AutopilotHealth)
+    assert found is not None
+    told = [Happening(at_s, "modes", "info", f"at {at_s:g} s", "raw.MODE", True) for at_s in (1.0, 177.0, 30.0)]
+    section = health(replace(results, answers={"health": replace(found, happenings=tuple(told))}))
+    assert section is not None
+    assert [row[2] for row in rows(section, "Modes and remarks logged")] == ["at 1 s", "at 30 s", "at 177 s"]
 
 
 def test_a_failure_throughout_stands_before_the_first_that_has_a_time() -> None:

@@ -52,6 +52,18 @@ def test_a_filter_that_stays_with_gnss_has_not_left_it(aided: Flight) -> None:
     assert found_in(aided)[0].departures == ()
 
 
+def test_epochs_compared_are_those_with_both_ins_and_gnss(aided: Flight) -> None:
+    """A row that only closes the grid of the filter is no epoch: the table of differences and the count are one."""
+    result = found_in(aided)[0]
+    position = result.difference("position")
+    assert position is not None and result.epochs == position.samples
+    time_s = aided.time_s("gnss")
+    later = aided["gnss"].take(time_s < time_s[-1] - 1.5)
+    fewer = found_in(replace(aided, tables={**aided.tables, "gnss": later}))[0]
+    shorter = fewer.difference("position")
+    assert shorter is not None and fewer.epochs == shorter.samples
+
+
 def test_a_departure_has_its_span_and_size(aided: Flight) -> None:
     result, told = found_in(shifted(aided, away(aided, 181.0, 1000.0, 1120.0)))
     (one,) = result.departures

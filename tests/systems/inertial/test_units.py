@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import NotAssessableError
+from groundstation.base.findings import Finding
 from groundstation.systems.inertial.study import units_limits as study
 from groundstation.systems.inertial.units import judge_units
 from groundstation.systems.inertial.units_answer import UnitsResult
@@ -18,7 +19,7 @@ from groundstation.systems.inertial.units_limits import limits_of
 from groundstation.systems.inertial.units_log import serials_of
 from groundstation.systems.inertial.units_track import ReferenceTrack, UnitTrack
 from tests.report_example import example
-from tests.section_contents import notes, rows
+from tests.section_contents import facts, notes, rows
 from tests.systems.inertial.units_example import (
     Change,
     Errors,
@@ -290,6 +291,19 @@ def test_units_of_a_short_log_are_not_judged_but_their_differences_are_told() ->
     bare = replace(other, heading_deg=None, latitude_deg=np.full(2, np.nan))
     with pytest.raises(NotAssessableError, match=r"found 0\.096 s of two INS together"):
         judge_units((north, bare))
+
+
+def test_the_chapter_says_which_message_feeds_each_unit() -> None:
+    """Units of a bus are ins.1 and ins.2: only the source tells which one is which."""
+    found = judge_units(units(2), None)
+    first, second = (unit.topic for unit in found.units)
+    results = example(found)
+    mapped = Finding("info", "reader.mapped", f"{second} from EGI2_INERTIAL (RT 16 T SA 29) of BUS1553-4", second)
+    other = Finding("info", "reader.mapped", f"{first}: true_heading_deg from the simulator's truth", first)
+    section = chapter(replace(results, findings=(*results.findings, mapped, other)))
+    assert section is not None
+    assert facts(section, "Where the units come from") == {second: ("EGI2_INERTIAL (RT 16 T SA 29) of BUS1553-4", "")}
+    assert "Where the units come from" not in str(chapter(results))
 
 
 _ROWS = ("time_s", "latitude_deg", "longitude_deg", "velocity_mps", "heading_deg")

@@ -284,6 +284,17 @@ def test_what_is_missing_is_one_line(missing: tuple[str, ...], reason: str) -> N
     assert "\n" not in str(told.value)
 
 
+def test_a_log_of_a_quarter_of_a_second_is_told_in_epochs() -> None:
+    """Two readings 0.25 s apart are an epoch, one a second, and not a second of heading."""
+    flight = flown().flight
+    ins = flight["ins"]
+    rows = np.flatnonzero(ins.time_ns <= ins.time_ns[0] + NS_PER_S // 4)
+    short = replace(flight, tables={**flight.tables, "ins": ins.take(rows)})
+    with pytest.raises(NotAssessableError) as told:
+        gather_epochs(short, "ins", flight_phases(short), MagneticFluxSettings())
+    assert "1 epoch of magnetic heading, one a second: 60 needed" in str(told.value)
+
+
 def test_readings_that_are_missing_or_stuck_are_no_traceback() -> None:
     flight = flown(with_ins=False).flight
     heading = flight["ins"].values("magnetic_heading_deg").copy()

@@ -10,6 +10,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind
+from groundstation.base.words import counted
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.columns import AnswerColumn
 from groundstation.systems.analysis import Analysis, Found
@@ -193,7 +194,7 @@ def _sentence(answers: Answers) -> str:
         if last.glide_path_m is not None and last.glide_path_95_m is not None:
             where += f" and {last.glide_path_m:+.0f} +- {last.glide_path_95_m:.0f} m off the glide path"
         where += f" {last.before_threshold_m:.0f} m before the threshold"
-    return f"{count} {'approach' if count == 1 else 'approaches'} by bearings{where}"
+    return f"{counted(count, 'approach', 'approaches')} by bearings{where}"
 
 
 def _last(value: Callable[[DeviationRow], Value]) -> Callable[[BeaconLanding], Value | None]:

@@ -3,6 +3,7 @@
 Deviations, their errors, what speaks against them.
 """
 
+from groundstation.base.words import counted
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.gates import setting_facts
 from groundstation.chapters.parts import Cell, Claim, Figure, Grid, Head, Mark, Note, Part, Rank, Section, kept
@@ -64,7 +65,7 @@ def landing_beacons(results: FlightResults) -> Section | None:
 
 def _headline(answer: BeaconLanding) -> str:
     count = len(answer.approaches)
-    told = f"{count} {'approach' if count == 1 else 'approaches'} to {answer.runway}"
+    told = f"{counted(count, 'approach', 'approaches')} to {answer.runway}"
     if not answer.rows:
         return told
     row = answer.rows[-1]
