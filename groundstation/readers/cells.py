@@ -55,8 +55,8 @@ class TableCells:
 
     def take(self, index: NDArray[np.integer[Any]]) -> "TableCells":
         """Return the rows that ``index`` selects."""
-        is_cut = self.cut is not None and self.cut.any()
-        return TableCells(self.column.take(index), self.unreadable[index], self.cut[index] if is_cut else None)
+        cut = None if self.cut is None or not self.cut.any() else self.cut[index]
+        return TableCells(self.column.take(index), self.unreadable[index], cut)
 
 
 def distinct(text: Any) -> tuple[Any, NDArray[np.integer[Any]]]:
