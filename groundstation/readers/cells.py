@@ -60,7 +60,9 @@ class TableCells:
 
 
 def distinct(text: Any) -> tuple[Any, NDArray[np.integer[Any]]]:
-    """Return the distinct cells of a column, a null behind them, and which of them each cell is.
+    """Return the distinct cells of a column, and which of them each cell is.
+
+    Behind them stands a null, for the cells that are empty.
 
     Examples
     --------

@@ -370,7 +370,10 @@ def csv_text(figure: FigureData, line_end: str = "\n") -> str:
 
 
 def _csv_column(values: NDArray[Any], places: int) -> tuple[str, list[Any]]:
-    """Return the form of a cell and what goes into it: all cells of a table are written in one go."""
+    """Return the form of a column's cells, and what goes into them.
+
+    All cells of a table are written in one go.
+    """
     kind = values.dtype.kind
     if kind == "f":
         rounded = np.round(values.astype(np.float64), places) + 0.0

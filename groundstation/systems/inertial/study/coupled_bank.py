@@ -156,7 +156,10 @@ def _at_start(
 
 
 def _grown(run: CoupledRun, exponentials: FloatArray, P: FloatArray, densities: FloatArray) -> FloatArray:
-    """Return the variance of the position at the leads, shape (l, 2), by the exponentials of the steps there."""
+    """Return the variance of the position at the leads, shape (l, 2).
+
+    The exponentials are those of the steps there.
+    """
     nothing = np.zeros(0, np.int64)
     unseen = kalman.Measurements(nothing, np.zeros((0, 0)), nothing, lines_of(run.epochs, run.noise))
     carried = kalman.run_filter(
