@@ -24,7 +24,7 @@ NOT_NEEDED = (  # to look at a log, check or convert it
 )
 OF_OTHER_LOGS = (  # a table of no profile is read, and its weather and earlier runs are not asked for
     *("groundstation.readers.bags.bag", "groundstation.readers.profile", "groundstation.readers.rtklib_rows"),
-    *("groundstation.readers.receiver.host_text", "groundstation.results.manifest", "groundstation.base.metar"),
+    *("groundstation.readers.receiver.host_text", "groundstation.base.metar"),
 )
 BY_VERB = """
 import os, sys

@@ -194,7 +194,7 @@ def unnamed_buses(ledger: Ledger) -> int:
 
 def _raw(results: FlightResults) -> str:
     """Return the messages of a log without signals; of buses, what names them."""
-    length = f"{_of_log(results.duration_s)} of " if results.duration_s else ""
+    length = f"{_of_log(results.duration_s)} of " if results.duration_s > 0.0 else ""
     if count := unnamed_buses(results.ledger):
         return f"{length}words of {counted(count, 'bus channel')} without ICD: {HOW_TO_NAME}"
     topics = sorted(

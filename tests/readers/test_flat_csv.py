@@ -138,10 +138,10 @@ def test_time_utc_with_and_without_zone(write: Write) -> None:
     assert log.times("ins") == [1777874400_000_000_000, 1777874400_250_000_000]
     for cell in ("2026-05-04T06:00:00", "2026-05-04 06:00"):
         log = Read(write(f"time_utc,ins.roll_deg\n{cell},1\n"))
-        assert log.times("ins") == [1777874400_000_000_000] and "1 times" in log.remarks["assumed_utc"].text
+        assert log.times("ins") == [1777874400_000_000_000] and "1 time" in log.remarks["assumed_utc"].text
     mixed = Read(write("time_utc,ins.roll_deg\n2026-05-04T06:00:00Z,1\n2026-05-04T06:00:01,2\n06:00,3\n"))
     assert mixed.times("ins") == [1777874400_000_000_000, 1777874401_000_000_000, None]
-    assert "1 times" in mixed.remarks["assumed_utc"].text and mixed.damage("unreadable_cells").count == 1
+    assert "1 time" in mixed.remarks["assumed_utc"].text and mixed.damage("unreadable_cells").count == 1
 
 
 def test_start_utc_gives_the_zero(write: Write) -> None:

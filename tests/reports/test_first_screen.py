@@ -26,7 +26,7 @@ OPENS = {
     "ulog/sample_px4_events.ulg": ("good", "Good", "GNSS good, filter healthy", "nothing lost"),
     "gnss/walk_0827_gnss_1730_sf.pos": ("warn", "Warnings", "RTK fixed 65 %", "GNSS (RTK fixed 65 %) at 4 Hz"),
     "gnss/drive_0708_gnss_1934_sf.pos": ("good", "Good", "RTK fixed 99.6 %", "9:09 min of GNSS"),
-    "g1000/log_220416_161856_LFQA.csv": ("warn", "Warnings", "Position jumps once", "3:12 min of GNSS, attitude"),
+    "g1000/log_220416_161856_LFQA.csv": ("good", "Good", "First fix after 87 s", "3:12 min of GNSS, attitude"),
     "foreign/robot_localization_jackal_test2.bag": ("plain", "Recorded", "61 s of attitude, odometry and IMU", ""),
     "ch10/kc135_429_1553_1MB.c10": ("warn", "Recorded", "0.654 s of words of 10 bus channels without ICD", ""),
     "ulog/Proto_FLT09_REENCODED_fixedwing.ulg": ("bad", "Left GNSS", "INS and GNSS up to 85.1 m", "8:50 min of GNSS"),

@@ -4,14 +4,12 @@ import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from groundstation.base.errors import GroundstationError, lack_of_memory
 from groundstation.base.failures import Failure
 from groundstation.base.failures import reason_of as why
-
-if TYPE_CHECKING:
-    from groundstation.results.manifest import PartOfRun
+from groundstation.results.manifest import PartOfRun
 
 State = Literal["done", "data_lost", "limit_reached", "incomplete", "failed", "skipped"]
 EXIT_CODE: Mapping[State, int] = {
@@ -75,7 +73,7 @@ class Outcome:
     is_beside: bool = False
     power_up: int = 0
     more: "tuple[Outcome, ...]" = ()
-    parts: "tuple[PartOfRun, ...]" = ()
+    parts: tuple[PartOfRun, ...] = ()
     loss: str = ""
 
     @property

@@ -61,10 +61,10 @@ def count_left_out(
 def reason_of(left: UnprovenGround, found: "Objections | None") -> str:
     """Return how many are left out, and what they say."""
     told_left = left_out_told(left)
-    if found is None or left.error_deg is None:
+    if left.error_deg is None:
         return f"{told_left}, of a vehicle that is not found to roll"
     with_them = f"{told_left}, with them {left.error_deg:+.3f} deg"
-    return f"{with_them}: {found.told}" if found.count else with_them
+    return f"{with_them}: {found.told}" if found is not None and found.count else with_them
 
 
 @dataclass(frozen=True)

@@ -148,17 +148,22 @@ def build_gates(
         *_normality_gates(values.normality, judge),
         *_steadiness_gates(values, judge),
     )
-    return (*throughout, *_unproven_gates((*throughout, *later), values, judge), *later)
+    verdict, _ = decide((*throughout, *later), standstill, settings)
+    unproven = _unproven_gates((*throughout, *later), values, judge, is_heard=verdict != "undecided")
+    return (*throughout, *unproven, *later)
 
 
-def _unproven_gates(others: tuple[Gate, ...], values: JudgedValues, judge: _Judge) -> tuple[Gate, ...]:
+def _unproven_gates(
+    others: tuple[Gate, ...], values: JudgedValues, judge: _Judge, *, is_heard: bool
+) -> tuple[Gate, ...]:
     """Judge what the straight epochs of unproven ground say against the others.
 
-    Where it only asks for more data, as the others would, that is no contradiction: the second gate fails.
+    It is not heard where the others leave the answer undecided: nothing is claimed then. Where it only asks for more data, as the others would, that is no contradiction: the second gate fails.
     """
     if values.unproven_ground is None:
         return tuple(judge(name, 0.0, "no straight epoch is left out for it") for name in (UNPROVEN, UNPROVEN_OPEN))
-    found, left = objections(others, values.interval_deg, values.whole), values.unproven_ground
+    left = values.unproven_ground
+    found = objections(others, values.interval_deg, values.whole) if is_heard else None
     reason = reason_of(left, found)
     if found is None:
         return judge(UNPROVEN, None, reason), judge(UNPROVEN_OPEN, None, reason)
