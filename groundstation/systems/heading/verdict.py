@@ -158,7 +158,8 @@ def _unproven_gates(
 ) -> tuple[Gate, ...]:
     """Judge what the straight epochs of unproven ground say against the others.
 
-    It is not heard where the others leave the answer undecided: nothing is claimed then. Where it only asks for more data, as the others would, that is no contradiction: the second gate fails.
+    It is not heard where the others leave the answer undecided: nothing is claimed then. Where it only asks for more
+    data, as the others would, that is no contradiction: the second gate fails.
     """
     if values.unproven_ground is None:
         return tuple(judge(name, 0.0, "no straight epoch is left out for it") for name in (UNPROVEN, UNPROVEN_OPEN))
