@@ -8,7 +8,7 @@ import pytest
 
 from groundstation.base.clock import StepEntry
 from groundstation.base.failures import Failure
-from groundstation.base.findings import Finding
+from groundstation.base.ledger import DATA_LOST, END_CUT
 from groundstation.cli import completion
 from groundstation.cli.lines import LONGEST, Lines, line_of
 from groundstation.cli.listing import summary_of
@@ -40,11 +40,9 @@ def test_a_flight_is_told_as_it_ends_and_once(capsys: pytest.CaptureFixture[str]
 
 
 def test_a_list_of_logs_says_that_the_end_alone_is_cut_off() -> None:
-    cut = Finding("warn", "data.truncated", "bytes of a frame that the end of the file cuts off: 41")
-    corrupt = Finding("warn", "data.corrupt", "bytes that belong to no record: 7")
     told = [
-        described({"format": "receiver"}, (), findings, has_lost_data=bool(findings))
-        for findings in ((), (cut,), (cut, corrupt))
+        described({"format": "receiver"}, (), (), has_lost_data=bool(loss), loss=loss)
+        for loss in ("", END_CUT, DATA_LOST)
     ]
     assert told == [f"receiver  no records{tail}" for tail in ("", "  end cut off", "  data lost")]
 

@@ -269,7 +269,7 @@ def test_texts_are_short(flight: OpenLog) -> None:
         text = repr(one)
         assert len(text) <= MOST_CHARACTERS and text.count("\n") < MOST_LINES, text
     assert repr(landing()) == "<LandingResult 1: landing on runway 06; 2: go-around on runway 06>"
-    assert "verdict='accept'" in repr(flight.heading()) and "gates (25)" in repr(flight.heading())
+    assert "verdict='accept'" in repr(flight.heading()) and "gates (26)" in repr(flight.heading())
 
 
 def test_texts_of_all_answers_come_from_the_short_one() -> None:

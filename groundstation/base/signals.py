@@ -200,7 +200,7 @@ INS_MODES = ("align", "nav", "attitude", "gnss_aided")
 FIXES = ("none", "2d", "3d", "dgnss", "rtk_float", "rtk_fixed", "ppp", "gnss_ins", "dead_reckoning", "other")
 RAW_PREFIX = "raw."
 BUS_PREFIX, BYTES_PREFIX = "raw.bus.", "raw.bytes."  # words and bytes as recorded: no numbers to look at
-HOW_TO_NAME = "`--icd FILE` names them, `info --suggest-icd` drafts one"  # words of buses
+HOW_TO_NAME = "--icd FILE names them, info --suggest-icd drafts one"  # words of buses
 
 
 def kind_of(topic: str) -> str:

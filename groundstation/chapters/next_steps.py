@@ -33,7 +33,7 @@ BY_REASON_OF_AN_INS: Remedies = (
 )
 CONTRADICTION = "data.contradiction"  # code of the finding on a log that contradicts itself
 LOST = "the recorder: data were lost"
-UNNAMED = "the buses with an ICD (`run --icd FILE`; `info --suggest-icd` drafts one)"
+UNNAMED = "the buses with an ICD (run --icd FILE; info --suggest-icd drafts one)"
 CUT = "that the log was copied whole: its end is cut off"
 
 

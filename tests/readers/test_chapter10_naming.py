@@ -226,9 +226,9 @@ def test_an_icd_applied_to_the_mcap_gives_what_it_gives_of_the_log(tmp_path: Pat
     convert_log(open_log(named, icds=("b100",)), other)
     assert canonical(other) == {}, "signals that the other ICD gave are gone"
     before, after = catalogue(plain), catalogue(plain, icds=(icd,))
-    assert before[0]["kind"] == "note" and "`--icd FILE` names them" in before[0]["title"]
+    assert before[0]["kind"] == "note" and "--icd FILE names them" in before[0]["title"]
     assert all(one["kind"] == "analysis" for one in after)
-    assert any("without ICD: `--icd FILE` names them" in one.text for one in describe(plain).findings)
+    assert any("without ICD: --icd FILE names them" in one.text for one in describe(plain).findings)
     told = describe(plain, icds=(icd,))
     assert not any("without ICD" in one.text for one in told.findings)
     assert [(one.place, one.what, one.names) for one in told.buses] == [("4", "RT 6 T SA 29", ("ATTITUDE",))]

@@ -15,6 +15,7 @@ from groundstation.systems.gnss.answer import (
 )
 
 FIXED = frozenset(STATE_NAMES) - {*NO_FIXES}
+THROUGHOUT = "throughout"
 WHOLE = 0.9995  # share that is all
 STEP_TOLD = 0.5  # of the scatter: a coarser step of the logged places is told
 BY_ACCURACY = ("rtk_fixed", "rtk_float", "dgnss", "3d")  # kinds of fix whose order of accuracy is known
@@ -44,11 +45,15 @@ def sentence_of(one: GnssReceiver) -> str:
 
 
 def _states(one: GnssReceiver) -> str:
+    """Return the kinds of fix with their share.
+
+    One alone is "throughout", which says that it was never lost.
+    """
     fixes = [(state.state, one.share_after_first_fix(state.state)) for state in one.states]
     fixes = sorted((pair for pair in fixes if pair[0] in FIXED), key=lambda pair: -pair[1])
     if len(fixes) == 1 and (fixes[0][1] >= WHOLE or one.start_s == one.end_s):
         name = name_of(fixes[0][0])
-        return name if one.start_s == one.end_s else f"{name} throughout"
+        return name if one.start_s == one.end_s else f"{name} {THROUGHOUT}"
     return ", ".join(f"{name_of(state)} {share_text(share)}" for state, share in fixes[:FEW])
 
 
@@ -65,7 +70,8 @@ def _lost(one: GnssReceiver) -> str:
     told = [_times("lost", lost), gaps_text(gaps)]
     if not lost and one.lost_s > 0.0:
         told[0] = f"lost for {seconds_text(one.lost_s)}"
-    return listed(told) or listed(("fix never lost", missing_of(one) if one.missed_epochs else ""))
+    never = "" if _states(one).endswith(THROUGHOUT) else "fix never lost"
+    return listed(told) or listed((never, missing_of(one) if one.missed_epochs else ""))
 
 
 def missing_of(one: GnssReceiver) -> str:

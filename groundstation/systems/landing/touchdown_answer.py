@@ -130,7 +130,8 @@ class Touchdown(Brief):
     sink_rate_sigma_mps: float | None = None  #: Standard deviation of the sink rate.
     sink_rate_by: str = ""  #: Topic that shows the sink rate.
     runway_slope: float | None = None  #: Rise of the ground along the roll-out, metres per metre.
-    runway_slope_sigma: float | None = None  #: Standard deviation of the slope.
+    #: Standard deviation of the slope by the noise of the altitude; its drift is not in it.
+    runway_slope_sigma: float | None = None
     witnesses: tuple[Witness, ...] = ()
     second_contacts: tuple[SecondContact, ...] = ()  #: Bounces, and struts that rebound.
 

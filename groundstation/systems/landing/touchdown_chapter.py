@@ -25,6 +25,7 @@ STATES: dict[str, tuple[Tone, str]] = {
     "disagrees": ("warn", "disagrees"),
     "not used": ("unknown", "not used"),
 }
+SLOPE_REMARK = "by the altitude on the roll-out; ±: 95 % of its noise alone, an altitude that drifts adds to it"
 
 
 def touchdown_parts(one: Approach, start_utc_ns: int | None) -> list[Part | None]:
@@ -55,7 +56,7 @@ def _facts(one: Approach, down: Touchdown, start_utc_ns: int | None) -> Facts:
             (f"Contact {count}", f"{clock(second.time_s)}, {number(second.load_g, 2, 'g')}", _second(second, down))
             for count, second in enumerate(down.second_contacts, 2)
         ),
-        ("Slope of the runway", _slope(down), "by the roll-out, ±: 95 %; rising positive" if down.runway_slope else ""),
+        ("Slope of the runway", _slope(down), SLOPE_REMARK if down.runway_slope else ""),
         ("Course of the roll-out", number(down.rollout_course_deg, 1, "°"), "line through its positions, true"),
         *_by_states(down.by_states),
     ]

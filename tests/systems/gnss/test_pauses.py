@@ -48,7 +48,7 @@ def test_a_pause_takes_no_share_and_loses_no_epoch() -> None:
     assert one.losses == () and one.silent_s == 0.0
     assert one.not_logged_s == pytest.approx(30.0, abs=STEP_S)
     assert seconds(one, "3d") == pytest.approx(WHOLE_S - 30.0, abs=2.0 * STEP_S)
-    assert found.answer.grade == "good" and found.answer.sentence.startswith("single (3D) throughout, fix never lost")
+    assert found.answer.grade == "good" and found.answer.sentence.startswith("single (3D) throughout")
     assert not [finding for finding in found.findings if finding.severity != "info"]
 
 
