@@ -75,9 +75,7 @@ def test_a_fix_at_latitude_zero_is_none() -> None:
     assert one.placeless_rows == 150 and one.first_fix_s == pytest.approx(30.0)
     assert shares(one)["none"] == pytest.approx(30.0 / WHOLE_S, abs=0.005)
     assert codes(table(time_s, **gone))["no_place"] == "warn"
-    assert answer(table(time_s, **gone)).sentence.startswith(
-        "first fix after 30 s, then single (3D) throughout"
-    )
+    assert answer(table(time_s, **gone)).sentence.startswith("first fix after 30 s, then single (3D) throughout")
 
 
 def test_a_loss_has_length_speeds_and_way() -> None:
