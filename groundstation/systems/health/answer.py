@@ -157,6 +157,11 @@ class Check(Brief):
     first_event_s: float | None = None  #: Flight second of the first one that decided; null without any.
 
     @property
+    def is_blank(self) -> bool:
+        """Tell whether its quantities are logged without a value."""
+        return self.verdict == "not_logged" and self.reason.startswith(LOGGED_BLANK)
+
+    @property
     def is_told(self) -> bool:
         """Tell whether it has a verdict, or values in the air that no limit judges."""
         return self.verdict != "not_logged" or any(one.is_unjudged for one in self.measures)

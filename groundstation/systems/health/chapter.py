@@ -23,7 +23,6 @@ from groundstation.results.flight import FlightResults
 from groundstation.systems.health.answer import (
     FIRST,
     HEADLINES,
-    LOGGED_BLANK,
     AutopilotHealth,
     Check,
     Happening,
@@ -50,8 +49,8 @@ def health(results: FlightResults) -> Section | None:
     if answer is None:
         return without_answer(results, "health", TITLE, LEAD)
     told = [one for one in answer.checks if one.is_told]
-    blank = [one for one in answer.checks if not one.is_told and one.reason.startswith(LOGGED_BLANK)]
-    missing = [one.title for one in answer.checks if not one.is_told and one not in blank]
+    blank = [one for one in answer.checks if one.is_blank]
+    missing = [one.title for one in answer.checks if not one.is_told and not one.is_blank]
     shown = [one.key for one in told if one.is_bad or one.key in FIRST]
     parts: list[Part] = [
         _checks(told, answer.judged_over),

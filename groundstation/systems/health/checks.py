@@ -312,10 +312,18 @@ def rise(value: FloatArray, flown: np.ndarray) -> float:
     >>> rise(np.array([5.0, 5.0, 7.0, 1.0, np.nan, 2.0]), np.array([False, True, True, True, False, True]))
     4.0
     """
+    rows, steps = _steps(value)
+    return float(steps[flown[rows]].sum())
+
+
+def _steps(value: FloatArray) -> tuple[Int64Array, FloatArray]:
+    """Return the rows to which a counter stepped, and by how much.
+
+    One that began again steps from 0.
+    """
     known = np.flatnonzero(np.isfinite(value))
     steps = np.diff(value[known])
-    begun_again = np.where(steps < 0.0, value[known][1:], steps)
-    return float(begun_again[flown[known][1:]].sum())
+    return known[1:], np.where(steps < 0.0, value[known][1:], steps)
 
 
 def _rises(value: FloatArray, in_air: np.ndarray, limit: Threshold) -> np.ndarray:
@@ -324,14 +332,12 @@ def _rises(value: FloatArray, in_air: np.ndarray, limit: Threshold) -> np.ndarra
     It is by how far the counter has risen until then: in the air by what it rose there, as the check counts it.
     """
     grade = np.zeros(len(value), dtype=np.int8)
-    known = np.flatnonzero(np.isfinite(value))
-    steps = np.diff(value[known])
-    steps = np.where(steps < 0.0, value[known][1:], steps)
-    flown = in_air[known][1:]
+    rows, steps = _steps(value)
+    flown = in_air[rows]
     risen = np.where(flown, np.cumsum(np.where(flown, steps, 0.0)), np.cumsum(steps))
     for level, above in ((1, limit.amber), (2, limit.red)):
         if above is not None:
-            grade[known[1:][(steps > 0.0) & (risen > above)]] = level
+            grade[rows[(steps > 0.0) & (risen > above)]] = level
     return grade
 
 

@@ -106,19 +106,23 @@ def _delay(flight: Flight, known: Known, parameters: Parameters) -> Iterator[Set
     yield SettingFound(name, what, "s", milliseconds / 1e3, best.latency_s, best.sigma_s, verdict, reason, source)
 
 
+def stated_declination(parameters: Parameters) -> tuple[str, float | None]:
+    """Return the parameter that states the declination, and its value in degrees.
+
+    The value is None where the log has none.
+    """
+    radians = parameters.value("COMPASS_DEC")
+    if radians is not None:
+        return "COMPASS_DEC", float(np.rad2deg(radians))
+    name = "EKF2_MAG_DECL" if "EKF2_MAG_DECL" in parameters.by_name else "ATT_MAG_DECL"
+    return name, parameters.value("EKF2_MAG_DECL", "ATT_MAG_DECL")
+
+
 def _declination(flight: Flight, _known: Known, parameters: Parameters) -> Iterator[SettingFound]:
     """Yield the declination beside that of the world model at the first position."""
-    radians, degrees = parameters.value("COMPASS_DEC"), parameters.value("EKF2_MAG_DECL", "ATT_MAG_DECL")
-    if radians is None and degrees is None:
+    name, stated = stated_declination(parameters)
+    if stated is None:
         return
-    name = (
-        "COMPASS_DEC"
-        if radians is not None
-        else "EKF2_MAG_DECL"
-        if "EKF2_MAG_DECL" in parameters.by_name
-        else "ATT_MAG_DECL"
-    )
-    stated = float(np.rad2deg(radians)) if radians is not None else float(degrees or 0.0)
     what, source = DECLINATION, parameters.source
     if parameters.value("COMPASS_USE") == 0.0:
         yield SettingFound(name, what, "deg", stated, None, None, "not_logged", "no compass in use", source)

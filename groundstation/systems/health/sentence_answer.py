@@ -10,7 +10,6 @@ from groundstation.base.words import capitalised, clock_text, listed, tenths_tex
 from groundstation.systems.health.answer import (
     FIRST,
     IN_TENTHS_S,
-    LOGGED_BLANK,
     LOST,
     AttitudeLoss,
     Check,
@@ -129,8 +128,8 @@ def _of_the_first(checks: Sequence[Check]) -> list[str]:
     first = [known[key] for key in FIRST if key in known]
     good = [_part(one) for one in first if one.verdict == "pass"]
     unlogged = [one for one in first if one.verdict == "not_logged"]
-    blank = [NAMES[one.key] for one in unlogged if one.reason.startswith(LOGGED_BLANK)]
-    absent = [NAMES[one.key] for one in unlogged if not one.reason.startswith(LOGGED_BLANK)]
+    blank = [NAMES[one.key] for one in unlogged if one.is_blank]
+    absent = [NAMES[one.key] for one in unlogged if not one.is_blank]
     missing = [f"{listed(names)} {what}" for names, what in ((blank, BLANK), (absent, "not logged")) if names]
     return [*filter(None, good), *missing]
 

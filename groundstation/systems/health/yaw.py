@@ -19,6 +19,7 @@ from groundstation.systems.health.ardupilot_sensors import FORWARD, is_off
 from groundstation.systems.health.evidence import Evidence, FloatArray
 from groundstation.systems.health.lean import down_of
 from groundstation.systems.health.logged import Series, at
+from groundstation.systems.health.parameters import stated_declination
 from groundstation.systems.health.world_field import first_position
 from groundstation.tables.parameters import Parameters, parameters_of
 from groundstation.tables.table import Flight, Table
@@ -96,8 +97,7 @@ def _declination(flight: Flight, parameters: Parameters) -> tuple[float, str] | 
             pass
         else:
             return float(model.values_deg[0]), f" and {float(model.values_deg[0]):.1f} deg of the {model.model}"
-    radians, degrees = parameters.value("COMPASS_DEC"), parameters.value("EKF2_MAG_DECL", "ATT_MAG_DECL")
-    stated = float(np.rad2deg(radians)) if radians is not None else float(degrees or 0.0)
+    _name, stated = stated_declination(parameters)
     if stated:
         return stated, f" and {stated:.1f} deg as set"
     return (0.0, "") if place is None else None
