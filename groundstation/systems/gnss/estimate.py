@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.errors import NotAssessableError
@@ -253,16 +254,9 @@ def _figures(found: Sequence[One], pairs: Sequence[ComparedReceivers]) -> tuple[
         ),
         _quality(found),
     ]
-    missing = [(one.rows, at) for one in found if (at := np.flatnonzero(_missing(one.rows))).size]
-    if missing:
-        figures.append(
-            GnssMissing(
-                topic=np.concatenate([np.full(len(at), rows.topic) for rows, at in missing]),
-                after_s=np.concatenate([rows.time_s[at] for rows, at in missing]),
-                next_s=np.concatenate([rows.time_s[at + 1] for rows, at in missing]),
-                epochs=np.concatenate([_missing(rows)[at] for rows, at in missing]),
-            )
-        )
+    places = [_missing(one.rows) for one in found if one.rows.missed]
+    if places:
+        figures.append(GnssMissing(**{name: np.concatenate([one[name] for one in places]) for name in places[0]}))
     stood = [(one.rows, one.stood) for one in found if one.stood is not None]
     if stood:
         figures += [_standstill(stood), _averaging(stood)]
@@ -271,9 +265,16 @@ def _figures(found: Sequence[One], pairs: Sequence[ComparedReceivers]) -> tuple[
     return tuple(figures)
 
 
-def _missing(rows: ReceiverRows) -> FloatArray:
-    missing = rows.missing
-    return np.zeros(0) if missing is None else missing.astype(np.float64)
+def _missing(rows: ReceiverRows) -> dict[str, NDArray[Any]]:
+    """Return the places where epochs of a receiver are missing, by column."""
+    missing = np.zeros(0) if rows.missing is None else rows.missing.astype(np.float64)
+    at = np.flatnonzero(missing)
+    return {
+        "topic": np.full(len(at), rows.topic),
+        "after_s": rows.time_s[at],
+        "next_s": rows.time_s[at + 1],
+        "epochs": missing[at],
+    }
 
 
 def _thinned(count: int) -> slice:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,7 +103,7 @@ class ReceiverRows:
         east = np.deg2rad(wrap_180(self.longitude_deg[rows] - longitude_deg)) * prime_vertical
         return np.column_stack([north, east * np.cos(np.deg2rad(latitude_deg))])
 
-    @property
+    @cached_property
     def is_gap(self) -> BoolArray:
         """Tell behind which rows there is a gap or a pause of the log, shape (n - 1,).
 
@@ -111,9 +112,9 @@ class ReceiverRows:
         is_long, missing = self.steps_s > self.gap_s, self.missing
         if missing is not None:
             is_long &= missing > 0
-        return is_long | (np.diff(self.time_s) > self.steps_s + 1e-6)
+        return is_long | (np.diff(self.time_s) > self.steps_s + ROUNDING_S)
 
-    @property
+    @cached_property
     def missing(self) -> NDArray[np.intp] | None:
         """Epochs that are missing behind each row but the last, shape (n - 1,).
 

@@ -210,7 +210,7 @@ def _fixes(flight: Flight, topic: str, excluded_s: tuple[tuple[float, float], ..
 
 
 def _fix_count(count: int) -> str:
-    return f"{counted(count, 'fix', 'fixes')}"
+    return counted(count, "fix", "fixes")
 
 
 def _velocity(table: Table, topic: str, notes: list[InputNote]) -> FloatArray:
