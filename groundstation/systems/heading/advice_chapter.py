@@ -92,8 +92,9 @@ def _longer(gate: Gate, answer: HeadingResult) -> Advice:
         wander, over = number(answer.wander_spread_deg, 2, "deg"), number(answer.wander_s, 0, "s")
         text = (
             f"the alignment of the INS: its heading wanders by {wander} (one sigma) over {over}, which a longer taxi "
+            "hardly averages: let it settle, and repeat the run"
         )
-        return Advice("Check", f"{text}hardly averages: let it settle, and repeat the run", PURPOSE, is_pressing=True)
+        return Advice("Check", text, PURPOSE, is_pressing=True)
     needed_s = answer.taxi_seconds * (gate.value / gate.limit) ** 2
     needed, now = number(needed_s, 0, "s"), number(answer.taxi_seconds, 0, "s")
     text = f"taxi straight for {needed} or more in all (now {now})"

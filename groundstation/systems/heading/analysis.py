@@ -112,10 +112,10 @@ def _sentence(answers: Answers) -> str:
     if heading.confidence95_measured_deg is not None:
         low, high = heading.confidence95_measured_deg
         text += f" ({low:+.3f} to {high:+.3f} without steady sideslip)"
-    left = "" if heading.unproven_ground is None else f"; {left_out_told(heading.unproven_ground)}"
-    if heading.correction_deg is not None:
-        return f"{text}, enter {heading.correction_deg:+g} deg{left}"
-    return f"{text} ({heading.verdict_reason}){'' if left[2:] in heading.verdict_reason else left}"
+    why = heading.verdict_reason
+    text += f" ({why})" if heading.correction_deg is None else f", enter {heading.correction_deg:+g} deg"
+    left = "" if heading.unproven_ground is None else left_out_told(heading.unproven_ground)
+    return text if left in why else f"{text}; {left}"
 
 
 def _on_ground(known: Known) -> HeadingOnGround:

@@ -7,6 +7,7 @@ import numpy as np
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.systems.inertial.units_answer import (
+    LEAST_S,
     InsFault,
     InsPair,
     InsUnit,
@@ -26,7 +27,6 @@ from groundstation.systems.inertial.units_verdict import growth_faults, is_commo
 from groundstation.tables.sources import AIDED
 
 DEFAULT_LIMITS = "navigation"  # of a class that was not simulated
-LEAST_S = 120.0  # of two units together
 
 
 def judge_units(
@@ -70,7 +70,7 @@ def judge_units(
     class_origin = ins_class_origin if limits_class == ins_class else f"{ins_class} was not simulated"
     longest_s = max(together_s(*pair) for pair in combinations(tracks, 2))
     if longest_s < LEAST_S:
-        short = differ_in_short(tracks, ins_class=limits_class, ins_class_origin=class_origin, least_s=LEAST_S)
+        short = differ_in_short(tracks, ins_class=limits_class, ins_class_origin=class_origin)
         if short is None:
             told = "no time" if longest_s < 0.0 else f"{longest_s:.2g} s"
             raise NotAssessableError("ins_units", f"{told} of two INS together", f"at least {LEAST_S:.0f} s")

@@ -11,6 +11,7 @@ FaultKind = Literal["drift", "tilt", "step", "swapped_axis", "stuck", "frozen", 
 Verdict = Literal["agree", "off", "one_of", "not_judged"]
 UNIT_STATES: tuple[str, ...] = ("good", "off", "one_of", "aided", "copy", "not_judged")
 SAME_HEADING_DEG = 0.5  # between two records of one unit
+LEAST_S = 120.0  # of two units together: in less they are not judged
 FAULT_KINDS: tuple[str, ...] = ("drift", "tilt", "step", "swapped_axis", "stuck", "frozen", "heading")
 VERDICTS: tuple[str, ...] = ("agree", "off", "one_of", "not_judged")
 

@@ -3,12 +3,13 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from groundstation.base.units import S_PER_H
 from groundstation.base.words import capitalised, listed
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Cell, Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, kept
 from groundstation.chapters.wording import ABSENT, clock, number, percent, typeset
 from groundstation.results.flight import FlightResults
-from groundstation.systems.inertial.units_answer import InsPair, InsUnit, Measured, UnitsResult
+from groundstation.systems.inertial.units_answer import LEAST_S, InsPair, InsUnit, Measured, UnitsResult
 
 TITLE = "Several INS"
 LEAD = (
@@ -36,7 +37,7 @@ VERDICTS = {
     "not_judged": "Not judged",
 }
 MAPPED = "reader.mapped"  # code of the finding on what feeds a topic
-SHORT_H = 120.0 / 3600.0  # of less no units are judged: it is told in seconds
+SHORT_H = LEAST_S / S_PER_H  # of less no units are judged: it is told in seconds
 
 
 def units(results: FlightResults) -> Section | None:
@@ -204,7 +205,7 @@ def _pair_state(pair: InsPair) -> Cell:
 
 
 def _together(pair: InsPair) -> Cell:
-    return f"{pair.hours * 3600.0:.2g} s" if pair.hours < SHORT_H else f"{number(pair.hours, 2)} h"
+    return f"{pair.hours * S_PER_H:.2g} s" if pair.hours < SHORT_H else f"{number(pair.hours, 2)} h"
 
 
 PAIR_COLUMNS: tuple[tuple[Head, Callable[[InsPair], Cell]], ...] = (

@@ -7,20 +7,18 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.base.geodesy import continuous_longitude_deg, north_east_m
+from groundstation.base.quantiles import NORMAL_95
+from groundstation.base.units import S_PER_H
 from groundstation.base.words import listed, with_half
-from groundstation.systems.inertial.units_answer import InsPair, InsUnit, Measured, UnitsResult
+from groundstation.systems.inertial.units_answer import LEAST_S, InsPair, InsUnit, Measured, UnitsResult
 from groundstation.systems.inertial.units_track import UnitTrack
 
 WHY_NOT = "too little of both together"
-TWO_SIGMA = 1.96
-SECONDS_PER_HOUR = 3600.0
 SAME_M, SAME_DEG = 0.5, 0.005  # smaller differences round to nothing
 
 
-def differ_in_short(
-    tracks: Sequence[UnitTrack], *, ins_class: str, ins_class_origin: str, least_s: float
-) -> UnitsResult | None:
-    """Return the differences of units that are together for less than ``least_s``.
+def differ_in_short(tracks: Sequence[UnitTrack], *, ins_class: str, ins_class_origin: str) -> UnitsResult | None:
+    """Return the differences of units that are together for less than :data:`LEAST_S`.
 
     None where none is known.
 
@@ -33,10 +31,10 @@ def differ_in_short(
     pairs = tuple(pair for pair in every if pair is not None)
     if not pairs:
         return None
-    longest_s = max(pair.hours for pair in pairs) * SECONDS_PER_HOUR
+    longest_s = max(pair.hours for pair in pairs) * S_PER_H
     return UnitsResult(
         verdict="not_judged",
-        sentence=f"{_told(pairs)} over {longest_s:.2g} s together: at least {least_s:.0f} s are needed to judge them",
+        sentence=f"{_told(pairs)} over {longest_s:.2g} s together: at least {LEAST_S:.0f} s are needed to judge them",
         off=(),
         units=tuple(_unit(one, ins_class) for one in tracks),
         pairs=pairs,
@@ -64,9 +62,7 @@ def _pair(first: UnitTrack, second: UnitTrack) -> InsPair | None:
     heading, distance = _heading_deg(first, second, time_s), _distance_m(first, second, time_s)
     if heading is None and distance is None:
         return None
-    return InsPair(
-        first.topic, second.topic, length_s / SECONDS_PER_HOUR, None, None, None, distance, heading, why_not=WHY_NOT
-    )
+    return InsPair(first.topic, second.topic, length_s / S_PER_H, None, None, None, distance, heading, why_not=WHY_NOT)
 
 
 def _within(time_s: FloatArray, first: UnitTrack, second: UnitTrack) -> FloatArray:
@@ -83,7 +79,7 @@ def _at(track: UnitTrack, values: FloatArray, time_s: FloatArray) -> FloatArray 
 
 def _measured(values: FloatArray) -> Measured | None:
     known = values[np.isfinite(values)]
-    return Measured(float(np.median(known)), TWO_SIGMA * float(np.std(known))) if len(known) else None
+    return Measured(float(np.median(known)), NORMAL_95 * float(np.std(known))) if len(known) else None
 
 
 def _heading_deg(first: UnitTrack, second: UnitTrack, time_s: FloatArray) -> Measured | None:

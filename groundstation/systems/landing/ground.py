@@ -13,13 +13,13 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.signals import topics_of_kind
 from groundstation.systems.landing.witnesses import rate_of
+from groundstation.tables.lift_off import SLOPE_SIGMA
 from groundstation.tables.sources import sources_of_kind
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight
 
 HEIGHT_CORRELATION_S = 1.0  # errors of neighbouring heights are one
-SLOPE_SIGMA = 0.01  # of a runway; ICAO Annex 14, volume I, 3.1.13 to 3.1.15: 1 % of the length, parts up to 1.5 %
 UNEVEN = 0.008  # change of slope beyond the roll-out that the line was fitted to; two recorded runways show 0.01
 ROLLS_S, SETTLED_S = 20.0, 3.5  # of the roll-out that is used, from so long behind the touchdown
 SLOWEST_SHARE = 0.3  # of the speed at the touchdown: then the aircraft leaves the runway
