@@ -11,6 +11,7 @@ Severity = Literal["info", "warn", "fail"]
 _AT_UTC = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?Z")
 _AT_SECONDS = re.compile(r"(?:^|\b(?:at|from) )\+?(\d{1,9}(?:\.\d+)?)(?: to \+?\d{1,9}(?:\.\d+)?)? s\b")
 SEVERITIES: tuple[Severity, ...] = ("info", "warn", "fail")
+CONTRADICTION = "data.contradiction"  # code: the log contradicts itself
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
+from groundstation.base.words import counted
+
 EVENT_SEPARATOR = ", "  # between the names of events that one record tells of
 
 Kind = Literal["double", "bool", "text"]
@@ -201,6 +203,11 @@ FIXES = ("none", "2d", "3d", "dgnss", "rtk_float", "rtk_fixed", "ppp", "gnss_ins
 RAW_PREFIX = "raw."
 BUS_PREFIX, BYTES_PREFIX = "raw.bus.", "raw.bytes."  # words and bytes as recorded: no numbers to look at
 HOW_TO_NAME = "--icd FILE names them, info --suggest-icd drafts one"  # words of buses
+
+
+def without_icd(buses: int) -> str:
+    """Return that the words of so many bus channels have no names, and what names them."""
+    return f"words of {counted(buses, 'bus channel')} without ICD: {HOW_TO_NAME}"
 
 
 def kind_of(topic: str) -> str:

@@ -6,6 +6,7 @@ them stands here. A signal that the log has is not asked for.
 
 from collections.abc import Iterator
 
+from groundstation.base.findings import CONTRADICTION
 from groundstation.base.ledger import END_CUT
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.words import capitalised, listed
@@ -31,7 +32,6 @@ BY_REASON_OF_AN_INS: Remedies = (
     ("no INS position", ("Record", "INS position")),
     ("no INS heading", ("Record", "INS heading")),
 )
-CONTRADICTION = "data.contradiction"  # code of the finding on a log that contradicts itself
 LOST = "the recorder: data were lost"
 UNNAMED = "the buses with an ICD (run --icd FILE; info --suggest-icd drafts one)"
 CUT = "that the log was copied whole: its end is cut off"

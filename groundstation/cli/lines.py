@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
+from groundstation.base.ledger import DATA_LOST
 from groundstation.cli.text import printable, say, tell_line
 from groundstation.pipeline.one_flight.log import log_name
 from groundstation.pipeline.one_flight.outcome import Outcome, State
@@ -11,12 +12,12 @@ from groundstation.pipeline.one_flight.progress import Event
 
 MOST_NAMED = 4  # logs of a session
 LONGEST = 160  # characters of a line behind the name of the log
-STATES: Mapping[State, str] = {"data_lost": "data lost", "limit_reached": "at the limit", "incomplete": "incomplete"}
+STATES: Mapping[State, str] = {"data_lost": DATA_LOST, "limit_reached": "at the limit", "incomplete": "incomplete"}
 GRADES: Mapping[str, str] = {
     **dict.fromkeys(("accept", "pass", "good", "agree", "stabilised", "consistent"), "green"),
     **dict.fromkeys(("measured", "joined"), "green"),
     **dict.fromkeys(("reject", "refused", "fail", "failed", "bad", "wrong", "off", "not", "left GNSS"), "red"),
-    **dict.fromkeys(("data lost", "moved while aligning"), "red"),
+    **dict.fromkeys((DATA_LOST, "moved while aligning"), "red"),
     **dict.fromkeys(("doubtful", "undecided", "ambiguous", "warn", "warnings", "filter wrong"), "yellow"),
     **dict.fromkeys(("no rate", "not judged", "not measured", "joined roughly"), "yellow"),
     **dict.fromkeys(("advisory", "extend", "too sure", "not stabilised", "they differ", "it or another"), "yellow"),

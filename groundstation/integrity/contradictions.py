@@ -23,7 +23,6 @@ from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.stuck import MotionSampler
 
 FloatArray = NDArray[np.float64]
-CONTRADICTION = "data.contradiction"  # code of the finding
 LASTS_S = 60.0  # a shorter stretch may be a turn, a slip, a receiver's bad minute
 WINDOW_S = 10.0  # speeds and directions are those between the ends of windows
 LONGEST_STEP_S = 5.0  # between samples; across a longer one nothing is compared

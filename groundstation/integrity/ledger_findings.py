@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from groundstation.base.findings import Finding, Severity
+from groundstation.base.findings import CONTRADICTION, Finding, Severity
 from groundstation.base.gaps import Gaps, Pause
 from groundstation.base.records import Damage
 from groundstation.base.signals import is_canonical
@@ -12,7 +12,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.base.words import counted
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.clock_findings import clock_findings
-from groundstation.integrity.contradictions import CONTRADICTION, Contradiction
+from groundstation.integrity.contradictions import Contradiction
 from groundstation.integrity.ledger import FieldCounts, LedgerCounts, TopicCounts
 from groundstation.integrity.limits import DuplicateLimits
 from groundstation.integrity.sequence import Sequence

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterable, Mapping
 
-from groundstation.base.ledger import Ledger, TopicEntry
-from groundstation.base.signals import BUS_PREFIX, HOW_TO_NAME, RAW_PREFIX, is_canonical, kind_of
+from groundstation.base.ledger import TRUNCATED, Ledger, TopicEntry
+from groundstation.base.signals import BUS_PREFIX, RAW_PREFIX, is_canonical, kind_of, without_icd
 from groundstation.base.words import IN_MS_BELOW_S, clock_text, counted, length_text, listed
 from groundstation.results.flight import SIMULATED_BY, FlightResults
 from groundstation.results.roles import WordsOfRecord
@@ -81,7 +81,7 @@ def words(results: FlightResults) -> Mapping[str, str]:
 def wholeness(results: FlightResults) -> str:
     """Return what was lost, or that nothing was."""
     ledger = results.ledger
-    places = sum(1 for one in ledger.damages if one.loses_data and one.kind != "truncated")
+    places = sum(1 for one in ledger.damages if one.loses_data and one.kind != TRUNCATED)
     lost = (
         _cut(ledger),
         counted(places, "damaged place") if places else "",
@@ -99,9 +99,7 @@ def _cut(ledger: Ledger) -> str:
     if cut is None:
         return ""
     return (
-        f"its end is cut off ({counted(cut.count, 'byte')} left of a record)"
-        if cut.what.startswith("bytes of a")
-        else CUT_OFF
+        f"{CUT_OFF} ({counted(cut.count, 'byte')} left of a record)" if cut.what.startswith("bytes of a") else CUT_OFF
     )
 
 
@@ -196,7 +194,7 @@ def _raw(results: FlightResults) -> str:
     """Return the messages of a log without signals; of buses, what names them."""
     length = f"{_of_log(results.duration_s)} of " if results.duration_s > 0.0 else ""
     if count := unnamed_buses(results.ledger):
-        return f"{length}words of {counted(count, 'bus channel')} without ICD: {HOW_TO_NAME}"
+        return f"{length}{without_icd(count)}"
     topics = sorted(
         ((name, one) for name, one in results.ledger.topics.items() if name.startswith(RAW_PREFIX)),
         key=lambda pair: -pair[1].rows,

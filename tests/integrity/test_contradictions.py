@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from groundstation.base.findings import Finding
-from groundstation.integrity.contradictions import CONTRADICTION
+from groundstation.base.findings import CONTRADICTION, Finding
 from groundstation.integrity.ledger_findings import ledger_findings
 from groundstation.integrity.survey import survey
 from groundstation.readers.registry import read

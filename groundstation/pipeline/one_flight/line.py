@@ -4,14 +4,13 @@ import re
 from typing import TYPE_CHECKING
 
 from groundstation.base.failures import attempt
+from groundstation.base.ledger import DATA_LOST
 from groundstation.chapters.by_answer import answers_in_order, loss_above
 from groundstation.results.flight import FlightResults
 from groundstation.results.recorded import clock_steps, recorded, simulated
 
 if TYPE_CHECKING:
     from groundstation.systems.system import Systems
-
-DATA_LOST = "data lost"
 
 
 def line_of_results(results: FlightResults, systems: "Systems") -> str:

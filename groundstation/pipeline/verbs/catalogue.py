@@ -4,8 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.base.ledger import Ledger
-from groundstation.base.signals import HOW_TO_NAME
-from groundstation.base.words import counted
+from groundstation.base.signals import without_icd
 from groundstation.pipeline.many_flights.inputs import file_in, is_session
 from groundstation.results.file_names import SUMMARY
 from groundstation.results.files import load_document
@@ -98,8 +97,7 @@ def _with_answers(path: Path, profile: Path | None, icds: tuple[str, ...]) -> li
 def _unnamed(ledger: Ledger) -> list[dict[str, Any]]:
     """Return what to do about bus words that no ICD names; nothing where there are none."""
     count = unnamed_buses(ledger)
-    title = f"words of {counted(count, 'bus channel')} without ICD: {HOW_TO_NAME}"
-    return [{"kind": "note", "name": "buses", "title": title, "needs": "nothing"}] if count else []
+    return [{"kind": "note", "name": "buses", "title": without_icd(count), "needs": "nothing"}] if count else []
 
 
 def _formats() -> list[dict[str, Any]]:

@@ -6,8 +6,7 @@ Channels are read block by block.
 from collections.abc import Iterator, Sequence
 
 from groundstation.base.records import Damage, Item, LogHeader, RecordBatch, Remark
-from groundstation.base.signals import BUS_PREFIX, HOW_TO_NAME
-from groundstation.base.words import counted
+from groundstation.base.signals import BUS_PREFIX, without_icd
 from groundstation.readers.chapter10.bus_words import bounded, messages_1553, words_429
 from groundstation.readers.chapter10.kinds import ARINC_429, EVENT, MIL_STD_1553
 from groundstation.readers.chapter10.naming import NO_ICD, named
@@ -50,7 +49,7 @@ def _recorded(source: Source, found: RecordingOverview, *, is_named: bool) -> It
             yield from bounded(batch)
     yield from start.remarks
     if buses and not is_named:
-        yield Remark(NO_ICD, f"words of {counted(len(buses), 'bus channel')} without ICD: {HOW_TO_NAME}")
+        yield Remark(NO_ICD, without_icd(len(buses)))
     yield from walk.tally.remarks(found.tmats)
     yield from walk.damages()
     for topic, count in lost.items():

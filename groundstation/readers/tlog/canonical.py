@@ -142,7 +142,8 @@ def landed(rows: NumericColumns) -> Columns:
 
 _ALTITUDE = {"pressure_altitude_m": "pressure in the standard atmosphere"}
 _TRACK = dict.fromkeys(("velocity_north_mps", "velocity_east_mps"), "track and ground speed of the receiver")
-_HEADING = {"true_heading_deg": "attitude of the autopilot's filter (ATTITUDE), true where it knows the declination"}
+OF_FILTER = "attitude of the autopilot's filter"
+_HEADING = {"true_heading_deg": f"{OF_FILTER} (ATTITUDE), true where it knows the declination"}
 RECEIVER = "GPS"
 # Messages that are instances of one source; every other message is its own.
 INSTANCES: Mapping[str, tuple[str, int]] = MappingProxyType({"GPS_RAW_INT": (RECEIVER, 0), "GPS2_RAW": (RECEIVER, 1)})

@@ -13,11 +13,11 @@ import numpy as np
 
 from groundstation.base.records import Column, Int64Array, Remark
 from groundstation.readers.parts import TopicPart
+from groundstation.readers.tlog.canonical import OF_FILTER
 
 STATUS = "EKF_STATUS_REPORT"
 UNINITIALISED = 1024
 VELOCITY = tuple(f"velocity_{axis}_mps" for axis in ("north", "east", "down"))
-_FILTER = "attitude of the autopilot's filter"
 _NAMES = {0.0: "attitude by DCM", 10.0: "the simulator's truth"}  # by AHRS_EKF_TYPE, where it is no filter
 
 
@@ -65,4 +65,4 @@ class OwnEstimate:
     def told(self, remark: Remark) -> Remark:
         """Return a remark with the estimator that gave the attitude in place of the filter."""
         name = _NAMES.get(self._type) if self._type is not None else None
-        return remark if name is None else replace(remark, text=remark.text.replace(_FILTER, name))
+        return remark if name is None else replace(remark, text=remark.text.replace(OF_FILTER, name))
