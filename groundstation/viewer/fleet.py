@@ -32,6 +32,7 @@ from groundstation.viewer.views import document
 Logged = tuple[ChartedAircraft, dict[str, rrb.View]]  # an aircraft and the views of the quantities it has
 FLEET = "fleet"
 FLIGHTS_TEXT = "flights"  # entity of the table of flights
+TABLE_SHARE = 2.0  # of the height, in densities, where there are several: with less the table shows its head alone
 
 
 def write_fleet_recording(path: Path, fleet: FleetResults, systems: Systems, layout: bytes = b"") -> None:
@@ -93,7 +94,8 @@ def _fleet(recorder: FleetRecorder, fleet: FleetResults, found: list[Logged]) ->
     if text:
         recorder.document("by_aircraft", text)
         answer = [document("By aircraft", "by_aircraft"), *answer]
-    columns = [rrb.Vertical(contents=answer)] if answer else []
+    shares = [TABLE_SHARE if text and place == 0 and len(answer) > 2 else 1.0 for place in range(len(answer))]
+    columns = [rrb.Vertical(contents=answer, row_shares=shares)] if answer else []
     if plots:
         columns.append(rrb.Vertical(contents=plots, row_shares=[3.0, 1.0][: len(plots)]))
     if not columns:
