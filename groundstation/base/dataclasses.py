@@ -18,7 +18,7 @@ _ABSENT = object()  # where a factory gives the value
 
 
 class _Init:
-    """The ``__init__`` of a class until somebody asks for it: then it is compiled, and takes this place."""
+    """Place of a class's ``__init__``: whoever asks for it first has it compiled."""
 
     def __init__(self, cls: type[Any], *, frozen: bool) -> None:
         self._cls, self._frozen = cls, frozen
@@ -32,17 +32,17 @@ class _Init:
 def _compiled_init(cls: type[Any], *, frozen: bool) -> Any:
     """Return the ``__init__`` of a class: its fields in order, then those by name alone."""
     known = sorted(dataclasses.fields(cls), key=lambda one: bool(one.kw_only))
-    names: dict[str, Any] = {"_set": object.__setattr__, "_absent": _ABSENT}
+    names: dict[str, Any] = {"_dataclass_set": object.__setattr__, "_dataclass_absent": _ABSENT}
     parameters, body = ["self"], []
     optional = ""
     for one in known:
         if not one.init and one.default_factory is dataclasses.MISSING:
             continue  # a default is found on the class
-        value, given = one.name, f"_given_{one.name}"
+        value, given = one.name, f"_dataclass_{one.name}"
         if one.default_factory is not dataclasses.MISSING:
             names[given] = one.default_factory
-            value = f"{given}() if {one.name} is _absent else {one.name}" if one.init else f"{given}()"
-            default = "=_absent"
+            value = f"{given}() if {one.name} is _dataclass_absent else {one.name}" if one.init else f"{given}()"
+            default = "=_dataclass_absent"
         elif one.default is not dataclasses.MISSING:
             names[given] = one.default
             default = f"={given}"
@@ -55,7 +55,7 @@ def _compiled_init(cls: type[Any], *, frozen: bool) -> Any:
                 raise TypeError(f"non-default argument {one.name!r} follows default argument {optional!r}")
             optional = one.name if default else optional
             parameters.append(one.name + default)
-        body.append(f"_set(self, {one.name!r}, {value})" if frozen else f"self.{one.name} = {value}")
+        body.append(f"_dataclass_set(self, {one.name!r}, {value})" if frozen else f"self.{one.name} = {value}")
     if hasattr(cls, "__post_init__"):
         body.append("self.__post_init__()")
     text = f"def __init__({', '.join(parameters)}):\n " + "\n ".join(body or ["pass"])
@@ -158,7 +158,7 @@ def _lazily(cls: type[Any], *, frozen: bool, eq: bool, repr: bool, kw_only: bool
         if not has_hash and frozen:
             _add_hash(cls)
         elif not has_hash:
-            cls.__hash__ = None
+            cls.__hash__ = None  # type: ignore[assignment]
     if frozen and not is_heir:
         _add_guards(cls)
     return cls
@@ -174,7 +174,7 @@ def _dataclass(
     kw_only: bool = False,
     **others: Any,
 ) -> Any:
-    """Make a class a dataclass, as the standard decorator does; with any other option (``slots``) by that itself."""
+    """Make a class a dataclass; with other options the standard decorator does it."""
     options = {"frozen": frozen, "eq": eq, "repr": repr, "kw_only": kw_only}
     if others:
         return dataclasses.dataclass(cls, **options, **others)
