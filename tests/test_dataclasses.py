@@ -4,18 +4,22 @@ import copy
 import dataclasses
 import inspect
 import pickle
+import re
 import threading
 from collections.abc import Callable
 from dataclasses import FrozenInstanceError, asdict, field, fields, replace
 from functools import cached_property
 from operator import eq
+from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
 
+import groundstation
 from groundstation.base.dataclasses import INIT, dataclass
 
 Make = Callable[..., Any]
+STANDARD_IMPORT = re.compile(r"^ *from dataclasses import .*\bdataclass\b|^@dataclasses\.dataclass", re.MULTILINE)
 
 
 def _family(make: Make) -> dict[str, Any]:
@@ -210,3 +214,12 @@ def test_a_field_without_a_default_after_one_with_it_is_refused() -> None:
     made: Any = dataclass(type("Bad", (), {"__annotations__": {"first": int, "second": int}, "first": 1}))
     with pytest.raises(TypeError, match="non-default argument 'second'"):
         made(2)
+
+
+def test_every_module_of_the_package_takes_this_decorator() -> None:
+    told = [
+        str(path)
+        for path in sorted(Path(groundstation.__file__).parent.rglob("*.py"))
+        if path.name != "dataclasses.py" and STANDARD_IMPORT.search(path.read_text(encoding="utf-8"))
+    ]
+    assert not told, f"from groundstation.base.dataclasses import dataclass: {', '.join(told)}"
