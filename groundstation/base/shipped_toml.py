@@ -4,7 +4,7 @@ A user's own files are chosen by path.
 """
 
 from dataclasses import dataclass
-from importlib import resources
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -40,10 +40,13 @@ class ShippedToml:
     folder: str
     what: str
 
+    @property
+    def _place(self) -> Path:
+        return Path(import_module(self.package).__path__[0], self.folder)
+
     def names(self) -> tuple[str, ...]:
         """Names of the shipped files, in alphabetical order."""
-        entries = (resources.files(self.package) / self.folder).iterdir()
-        return tuple(sorted(Path(entry.name).stem for entry in entries if entry.name.endswith(SUFFIX)))
+        return tuple(sorted(path.stem for path in self._place.glob(f"*{SUFFIX}")))
 
     def read(self, name_or_path: str | Path) -> TomlFile:
         """Read a shipped file by name (any case), or a user's file by its path.
@@ -63,7 +66,7 @@ class ShippedToml:
         elif wanted.lower() in self.names():
             name = wanted.lower()
             where = f"{name}{SUFFIX}"
-            text = (resources.files(self.package) / self.folder / where).read_text(encoding="utf-8")
+            text = (self._place / where).read_text(encoding="utf-8")
         else:
             raise SettingsError(self.what, repr(wanted), f"a file *{SUFFIX} or one of {', '.join(self.names())}")
         return TomlFile(name, where, toml_table(text, where, f"a TOML file for {self.what}"), text)
