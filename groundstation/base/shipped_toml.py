@@ -16,12 +16,13 @@ SUFFIX = ".toml"
 
 @dataclass(frozen=True)
 class TomlFile:
-    """TOML file: name without suffix, its name in errors, its table and its text."""
+    """TOML file: name without suffix, its name in errors, its table and its text, and whether it came with us."""
 
     name: str
     where: str
     table: dict[str, Any]
     text: str
+    is_shipped: bool = False
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,8 @@ class ShippedToml:
             For an unknown name, and for a file that cannot be read or is not TOML.
         """
         wanted = str(name_or_path)
-        if wanted.endswith(SUFFIX):
+        is_shipped = not wanted.endswith(SUFFIX)
+        if not is_shipped:
             path = Path(name_or_path)
             where, name = path.name, path.stem
             text = toml_text(path, where, f"a TOML file for {self.what}")
@@ -69,4 +71,4 @@ class ShippedToml:
             text = (self._place / where).read_text(encoding="utf-8")
         else:
             raise SettingsError(self.what, repr(wanted), f"a file *{SUFFIX} or one of {', '.join(self.names())}")
-        return TomlFile(name, where, toml_table(text, where, f"a TOML file for {self.what}"), text)
+        return TomlFile(name, where, toml_table(text, where, f"a TOML file for {self.what}"), text, is_shipped)
