@@ -80,8 +80,7 @@ class ChunkMessages:
 
         The records must have an even stride.
         """
-        values: NDArray[Any] = self.matrix()[:, offset : offset + dtype.itemsize].view(dtype)[:, 0]
-        return values
+        return np.ndarray((len(self),), dtype, self.buffer.data, int(self.starts[0]) + offset, (self.stride,))
 
 
 def at_any_byte(buffer: ByteArray, dtype: np.dtype[Any]) -> NDArray[Any]:
