@@ -205,11 +205,7 @@ def _evenly_spaced(buffer: ByteArray) -> ChunkMessages | None:
         np.broadcast_to(np.int64(stride), count),
         stride,
     )
-    for offset in (0, 3):  # together: opcode, length and channel
-        words = messages.column(np.dtype("<u8"), offset)
-        if (words != words[0]).any():
-            return None
-    return messages
+    return messages if messages.is_alike(0, HEAD.fields["sequence"][1]) else None
 
 
 @dataclass
