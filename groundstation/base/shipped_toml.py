@@ -3,11 +3,11 @@
 A user's own files are chosen by path.
 """
 
-from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_text import toml_table, toml_text
 

@@ -8,12 +8,13 @@ their neighbours. Nothing here knows the wall clock: without absolute time, time
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from groundstation.base.clock import Clock, Start, StepEntry
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column, Int64Array, RecordBatch, frozen
 from groundstation.base.timescales import duration_text, iso_to_utc_ns, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S

@@ -1,10 +1,10 @@
 """Steps of a recorder's clock, and rows out of order that are no steps."""
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.toml_settings import number
 from groundstation.base.units import NS_PER_S

@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column, Int64Array, RecordBatch
 from groundstation.base.signals import is_canonical, kind_of
 from groundstation.integrity.clock import ClockModel

@@ -7,13 +7,13 @@ nothing is dropped.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import direction_of, wrap_180
 from groundstation.base.climb import OPPOSITE, climb_agreement
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import METRES_PER_DEG
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.signals import kind_of

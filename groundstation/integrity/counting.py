@@ -6,11 +6,11 @@ autopilot that begins a log writes the newest value of every topic with the time
 before, and some topics never advance their time at all. Such records are placed where they stand in the log.
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.toml_settings import number
 from groundstation.base.units import NS_PER_S

@@ -1,10 +1,11 @@
 """Count of the samples of an inertial unit at the end of its range, batch by batch."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column, RecordBatch
 from groundstation.base.signals import kind_of
 from groundstation.base.units import DEG_PER_RAD

@@ -1,11 +1,12 @@
 """Rhythm of a topic: its usual step in time, whether that is a period, and its gaps."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fnmatch import fnmatchcase
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.gaps import Gaps, Pause, logged_ns
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import is_canonical

@@ -5,12 +5,12 @@ Nothing is called stuck without a witness: a parked aircraft, a held slow channe
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from groundstation.base.angles import direction_of, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import METRES_PER_DEG
 from groundstation.base.records import Int64Array, RecordBatch
 from groundstation.base.signals import kind_of

@@ -1,13 +1,14 @@
 """Noise parameters by INS class (TOML in ins_classes/): gyros, GNSS, initial errors."""
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import product
 from typing import Literal
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.toml_settings import number, settings_from

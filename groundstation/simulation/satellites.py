@@ -8,13 +8,13 @@ Source: Vallado, Fundamentals of Astrodynamics and Applications, 4th ed. 2013, s
 (sidereal time, equation 3-45) and 9.6 (secular rates due to J2, equations 9-37 to 9-39).
 """
 
-from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.geodesy import EARTH_RATE_RADPS, SEMI_MAJOR_M
 from groundstation.base.timescales import iso_to_utc_ns

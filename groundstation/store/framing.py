@@ -8,7 +8,7 @@ Source: MCAP format specification, https://mcap.dev/spec.
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from io import BytesIO
 from typing import Any, BinaryIO, TypeAlias, cast
 
@@ -32,6 +32,7 @@ from mcap.records import (
     SummaryOffset,
 )
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 from groundstation.store.marks import MAGIC, RECORD_PREFIX
 from groundstation.store.messages import HEAD, MESSAGE_OPCODE, ByteArray, ChunkMessages

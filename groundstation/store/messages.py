@@ -1,12 +1,12 @@
 """Message records as they lie in a chunk: their head, their starts, which are alike."""
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 
 ByteArray = NDArray[np.uint8]

@@ -11,12 +11,12 @@ import zlib
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import BinaryIO, TypeAlias, cast
 
 from mcap.opcode import Opcode
 from mcap.records import Channel, ChunkIndex, Metadata, Schema
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.store.channel import COLUMNS_KEY, DERIVED_KEY
 from groundstation.store.framing import (

@@ -9,12 +9,12 @@ Sources: protobuf encoding, https://protobuf.dev/programming-guides/encoding; MC
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.sorted_values import distinct
 from groundstation.store.marks import RECORD_PREFIX

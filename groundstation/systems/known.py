@@ -5,10 +5,11 @@ It holds aircraft, airfield, the user's intervals and earlier answers.
 
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, SettingsError
 from groundstation.base.runways.table import RunwayTable
 from groundstation.base.timescales import iso_to_utc_ns

@@ -4,13 +4,14 @@ It costs as much as the matrices have entries. The frozen types hold arrays; the
 ``smoother_runs``). A compiled loop of another folder may call their parts (``kernels``) itself.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array, frozen
 from groundstation.methods.kalman.arrays import (
     NO_STEP,

@@ -3,11 +3,11 @@
 Here are their transitions, and states carried forward by them.
 """
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array, frozen
 from groundstation.methods.kalman.arrays import FloatArray
 from groundstation.methods.kalman.transition import Transition

@@ -4,7 +4,7 @@ Everything that the data allows is answered.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.clock import Clock
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError, SettingsError
 from groundstation.base.failures import attempt, left_out
 from groundstation.base.findings import Finding, Severity

@@ -5,12 +5,13 @@ gives any: a log is converted without.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from datetime import datetime
 from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError, UsageError
 from groundstation.base.toml_settings import settings_from
 from groundstation.base.toml_text import toml_table, toml_text

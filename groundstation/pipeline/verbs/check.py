@@ -4,11 +4,12 @@ It writes nothing.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from groundstation.base.clock import Clock
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UnreadableLogError, UsageError
 from groundstation.base.findings import SEVERITIES, Finding, worst
 from groundstation.base.ledger import DATA_LOST, Ledger

@@ -4,10 +4,11 @@ Told without running the analysis where it can examine the data; else it is run,
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError, SettingsError, UsageError
 from groundstation.base.findings import Finding
 from groundstation.base.signals import topics_of_kind

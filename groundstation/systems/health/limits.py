@@ -1,10 +1,11 @@
 """Thresholds of the checks: thresholds.toml, and what a user's settings change in it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cache
 from typing import Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.toml_settings import check_ranges, number, settings_from

@@ -1,9 +1,10 @@
 """Motion of the craft by its INS, with Earth and craft rates and specific force."""
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import EARTH_RATE_RADPS, curvature_radii_m
 from groundstation.base.records import frozen
 from groundstation.systems.inertial.differences import InsDifferences

@@ -4,13 +4,13 @@
 ``python -m groundstation.systems.inertial.study.units_limits``.
 """
 
-from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from typing import Any
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_text import toml_table
 
 FILE = "units_limits.toml"

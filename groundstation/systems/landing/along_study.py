@@ -8,10 +8,11 @@ families each break one assumption.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.base.runways.table import END_SIGMA_M, SHIFT_SIGMA_M, THRESHOLD_SIGMA_M, RunwayTable

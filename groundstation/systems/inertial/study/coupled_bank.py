@@ -4,11 +4,12 @@ See docs/decisions/012.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.methods.kalman import filter as kalman
 from groundstation.results.figures import FigureData
 from groundstation.simulation.inertial_family import simulate_family
