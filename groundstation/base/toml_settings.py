@@ -124,7 +124,7 @@ def trusted(cls: type[Settings], table: Mapping[str, Any]) -> Settings:
     >>> trusted(Wind, {"north_mps": 3, "levels_m": [10.0]})
     Wind(north_mps=3.0, levels_m=(10.0,))
     """
-    hints = _hints(typing.cast("type[Any]", cls))
+    hints = _hints(cls)  # type: ignore[arg-type]  # a class can be hashed
     return cls(**{name: _trusted(hints[name], value) for name, value in table.items()})
 
 
