@@ -85,7 +85,7 @@ class Thinner:
         return kept
 
     def _followed(self, time: Int64Array, starts: Int64Array, ahead: BoolArray) -> BoolArray:
-        """Do the same in one pass."""
+        """Tell it of many records, in one pass."""
         if not len(self._table):
             self._table = np.zeros(TABLE_STEPS, dtype=np.int64)
         kept, rest = np.empty(len(time), dtype=bool), np.empty(len(time), dtype=np.int64)
