@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from groundstation.base.records import BoolArray, Int64Array
+from groundstation.integrity import time_passes
 from groundstation.integrity.time_passes import (
     EARLIEST,
     LATENESS,
@@ -73,7 +74,7 @@ class Thinner:
         starts = starts_of_runs(time, self._tolerance_ns)
         lengths = np.diff(starts, append=len(time))
         ahead = self._ahead(time, starts, lengths)
-        if passes_over(time):
+        if passes_over(time, least=time_passes.MANY_IN_ALL):
             return self._followed(time, starts, ahead)
         steps = np.diff(time)
         self._steps.append(np.unique(steps[steps > 0], return_counts=True))
