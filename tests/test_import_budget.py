@@ -109,7 +109,8 @@ def test_a_run_and_its_report_do_without_pandas(verb: str, tmp_path: Path) -> No
     run = ["run", str(SAMPLE), "-o", str(out), "-q", "-j", "1", "--no-pdf"]
     assert CliRunner().invoke(app, run).exit_code == 0  # compiles, where that was not done before
     again = {"run": [*run, "--redo"], "report": ["report", str(out), "-q"]}[verb]
-    assert loaded(BY_VERB, *again, names=("pandas", "numba", "scipy.linalg", "scipy.optimize")) == []
+    names = ("pandas", "numba", "scipy.linalg", "scipy.optimize", "pydantic", "urllib.request")
+    assert loaded(BY_VERB, *again, names=names) == []
 
 
 def test_pandas_is_found_by_everybody_but_pyarrow_in_its_first_look() -> None:

@@ -5,6 +5,7 @@ From 0.29 on Typer has pydantic convert every one of them, also those that are l
 """
 
 import os
+import re
 from functools import partial
 from pathlib import Path
 from types import NoneType, UnionType
@@ -12,6 +13,8 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import typer.core
 from typer.models import ParameterInfo
+
+_DIGITS = re.compile("[0-9]{1,9}")  # a whole number that every parser reads alike
 
 
 class _OtherError(Exception):
@@ -70,11 +73,20 @@ def plain(value: Any, kind: Any, about: ParameterInfo, *, is_list: bool = False)
         return [plain(one, get_args(kind)[0], about) for one in value]
     if get_origin(kind) is Literal and value in get_args(kind):
         return value
-    if kind in (str, bool, int, float) and type(value) is kind:  # of a number only the default: our own
+    if kind in (str, bool, int, float) and type(value) is kind:
         return value
+    if kind in (int, float) and isinstance(value, str) and _DIGITS.fullmatch(value):
+        return _within(kind(value), about)
     if kind is Path and isinstance(value, str | Path) and not _is_checked(value, about):
         return Path(value)
     raise _OtherError
+
+
+def _within(number: float, about: ParameterInfo) -> float:
+    """Return a number that the limits of its parameter allow."""
+    if (about.min is not None and number < about.min) or (about.max is not None and number > about.max):
+        raise _OtherError
+    return number
 
 
 def _is_checked(path: str | Path, about: ParameterInfo) -> bool:
