@@ -94,7 +94,7 @@ import numpy as np
 from groundstation.methods.kalman.rates import Rates
 rates = Rates(2, np.array([0]), np.array([1]))
 rates.transition(np.ones((3, 1)), np.ones(3), np.ones(2))
-rates.carried(np.ones((4, 1)), 1.0, 2, np.ones(2))
+rates.carried(np.ones((4, 1)), np.zeros((3, 4), int), 1.0, 2, np.ones((3, 2)))
 """
 
 
