@@ -29,10 +29,18 @@ class PlainWords(typer.core.TyperCommand):
         return with_plain_words(self.callback, super().get_params(ctx))
 
 
+class PlainGroup(typer.core.TyperGroup):
+    """Group of verbs whose own options are taken as they stand."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Return the parameters, with that of the help."""
+        return with_plain_words(self.callback, super().get_params(ctx))
+
+
 def with_plain_words(callback: Any, parameters: list[Any]) -> list[Any]:
     """Return parameters of a verb, or of the application, that take plain words as they stand."""
     if others := [one for one in parameters if "process_value" not in vars(one)]:
-        hints = get_type_hints(callback, include_extras=True)
+        hints = get_type_hints(callback, include_extras=True) if callback else {}
         for one in others:
             kind, *about = get_args(hints.get(one.name)) or (None,)
             info = next((each for each in about if isinstance(each, ParameterInfo)), ParameterInfo())
