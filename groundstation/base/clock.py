@@ -3,8 +3,10 @@
 Times are text for people. Fields stand in alphabetical order, as the JSON of the MCAP has its keys.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar, Literal
+
+from groundstation.base.dataclasses import dataclass
 
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
 

@@ -5,7 +5,6 @@ length half is within 0.5 km of the shore, 90 % within 1.8 km. Of the shores 90 
 below 2 km2 and narrow bays are not in it, nor are lakes.
 """
 
-from dataclasses import dataclass
 from functools import cache
 from math import asin, cos, degrees, radians, sin
 from pathlib import Path
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import SEMI_MAJOR_M
 from groundstation.base.records import BoolArray
 

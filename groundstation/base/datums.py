@@ -8,11 +8,10 @@ Source: EPSG Geodetic Parameter Dataset, operations by their codes; of these 504
 7024 (Krassowsky 1940), 7022 (International 1924), 7008 (Clarke 1866), 7004 (Bessel 1841).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.ecef import ecef_from_n, ecef_m
 
 RAD_PER_ARCSEC = float(np.deg2rad(1.0 / 3600.0))

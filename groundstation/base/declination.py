@@ -4,13 +4,13 @@ Before the first world magnetic model the IGRF is used.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import NamedTuple
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, unwrap, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.geodesy import SEMI_MAJOR_M
 from groundstation.base.records import frozen

@@ -5,9 +5,10 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, TypeVar, TypeVarTuple
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, lack_of_memory
 from groundstation.base.printable import in_a_line
 

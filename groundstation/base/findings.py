@@ -1,9 +1,9 @@
 """Findings: what a user must know about a flight, with its place and severity."""
 
 import re
-from dataclasses import dataclass
 from typing import Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 

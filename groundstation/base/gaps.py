@@ -1,11 +1,11 @@
 """Gaps in the times of one topic, and pauses of the whole log."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array, frozen
 from groundstation.base.units import NS_PER_S
 

@@ -6,9 +6,10 @@ is written equal.
 
 import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.serial import LEFT_OUT_WHEN_DEFAULT
 from groundstation.base.words import counted
 

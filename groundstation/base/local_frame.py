@@ -3,13 +3,13 @@
 All aircraft of a session share its axes.
 """
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from groundstation.base.angles import FloatArray, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.ecef import ecef_from_n, ecef_m, geodetic_deg_m
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import check_ranges, number, required_number

@@ -9,8 +9,8 @@ import ctypes
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cache, cached_property
+from importlib.util import find_spec
 from itertools import count
 from pathlib import Path
 from types import FunctionType
@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.own_files import read_own, write_own
 
 INTEGER, NUMBER = "integer", "number"
@@ -131,17 +132,37 @@ def plain_forms(forms: Sequence[Form]) -> Iterator[str | tuple[str, int]]:
             yield form
 
 
+@cache
+def installed_version(package: str) -> str:
+    """Return the version of an installed package, by the name of the folder of its metadata.
+
+    ``importlib.metadata`` reads that folder; importing it takes longer than finding and linking a loop.
+
+    Examples
+    --------
+    >>> import numba
+    >>> installed_version("numba") == numba.__version__
+    True
+    """
+    spec = find_spec(package)
+    beside = Path(spec.origin).parent.parent.glob(f"{package}-*.dist-info") if spec and spec.origin else ()
+    versions = [found.name.removeprefix(f"{package}-").removesuffix(".dist-info") for found in beside]
+    if len(versions) == 1:
+        return versions[0]
+    from importlib.metadata import version
+
+    return version(package)
+
+
 def digest_of(function: Callable[..., Any], forms: Sequence[Form]) -> bytes:
     """Return a digest of all that the machine code of a loop depends on.
 
     That is its code and constants, and those of all that it calls.
     """
-    from importlib.metadata import version
-
     from llvmlite import __version__, binding
 
     told = hashlib.sha256(
-        repr((LAYOUT, forms, entry_source(function, forms)[0], version("numba"), __version__)).encode()
+        repr((LAYOUT, forms, entry_source(function, forms)[0], installed_version("numba"), __version__)).encode()
     )
     told.update(f"{binding.get_host_cpu_name()} {binding.get_host_cpu_features().flatten()}".encode())
     told.update(binding.get_process_triple().encode())

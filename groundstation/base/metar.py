@@ -6,9 +6,9 @@ Source: WMO-No. 306, Manual on Codes, volume I.1, FM 15 METAR: CCCC YYGGggZ (AUT
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.units import NS_PER_S
 
 MPS_PER: dict[str, float] = {"KT": 1852.0 / 3600.0, "MPS": 1.0, "KMH": 1.0 / 3.6}

@@ -7,11 +7,13 @@ assumed). Missing stays missing: absent values are marked, never filled.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+
+from groundstation.base.dataclasses import dataclass
 
 Int64Array = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]

@@ -4,10 +4,10 @@ schemas/*.proto is the list; a test holds this module against it.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.words import counted
 
 EVENT_SEPARATOR = ", "  # between the names of events that one record tells of

@@ -5,11 +5,12 @@ escape. Where long tables are no help, on paper and in panels that are laid out 
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from enum import IntEnum
 from pathlib import Path
 from typing import ClassVar, Literal, NamedTuple, TypeAlias
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.chapters.wording import number
 
 Tone = Literal["good", "bad", "warn", "unknown", "plain"]

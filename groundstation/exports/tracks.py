@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, interpolate_heading, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.ellipse import ELLIPSE_95, principal_axes
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind

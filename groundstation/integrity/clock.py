@@ -8,12 +8,13 @@ their neighbours. Nothing here knows the wall clock: without absolute time, time
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from groundstation.base.clock import Clock, Start, StepEntry
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column, Int64Array, RecordBatch, frozen
 from groundstation.base.timescales import duration_text, iso_to_utc_ns, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
@@ -95,17 +96,24 @@ class ClockModel:
         for name in ("starts", "offsets_ns", "placed_index", "placed_ns", "stray_index"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
-    def time_ns(self, record_index: Int64Array, device_time_ns: Column) -> Int64Array:
+    @property
+    def is_shift(self) -> bool:
+        """Tell whether corrected time is device time and one offset, for every record."""
+        return len(self.starts) == 1 and not len(self.placed_index)
+
+    def time_ns(self, record_index: Int64Array, device_time_ns: Column, out: Int64Array | None = None) -> Int64Array:
         """Corrected time, nanoseconds, shape (n,), of records given by place and device time.
 
-        Records without a time of their own must be among those the survey saw.
+        Records without a time of their own must be among those the survey saw. ``out`` is an array to write it to.
         """
-        time = device_time_ns.values + self._offset_ns(record_index)
+        time = np.add(device_time_ns.values, self._offset_ns(record_index), out=out)
         if not len(self.placed_index) or not len(record_index):
             return np.asarray(time, dtype=np.int64)
         if (record_index[1:] <= record_index[:-1]).any():
             at = np.minimum(np.searchsorted(self.placed_index, record_index), len(self.placed_index) - 1)
-            return np.where(self.placed_index[at] == record_index, self.placed_ns[at], time)
+            is_placed = self.placed_index[at] == record_index
+            time[is_placed] = self.placed_ns[at[is_placed]]
+            return np.asarray(time, dtype=np.int64)
         low, high = np.searchsorted(self.placed_index, (record_index[0], record_index[-1] + 1))
         at = np.searchsorted(record_index, self.placed_index[low:high])  # few are placed: they are looked for
         found = record_index[at] == self.placed_index[low:high]

@@ -7,13 +7,14 @@ errors allow for noise that is correlated from block to block, for the few block
 rounded: 1.96 of them hold the truth in 95 of 100 logs, in 92 when noise is correlated over a tenth of the log.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import Int64Array
 from groundstation.base.units import NS_PER_S

@@ -4,7 +4,7 @@ A field of a raw topic is a clock when the thresholds say so, ``[[clock_relation
 of each are kept, evenly spread. Corrected time is never changed by what is found.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from fnmatch import fnmatchcase
 from itertools import pairwise
 from typing import Any, Literal
@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
 from groundstation.base.timescales import WEEK_NS, gps_week_to_utc_ns, iso_to_utc_ns, whole_weeks

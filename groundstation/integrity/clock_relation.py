@@ -1,9 +1,9 @@
 """Relation of a recorder's clock to another clock of the log, in figures and in words."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from groundstation.base.clock import BreakEntry, MistakeEntry, RelationEntry, SegmentEntry
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.timescales import (
     ROLLOVER_WEEKS,
     leap_seconds_at,

@@ -1,10 +1,11 @@
 """Count of the samples of an inertial unit at the end of its range, batch by batch."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column, RecordBatch
 from groundstation.base.signals import kind_of
 from groundstation.base.units import DEG_PER_RAD
@@ -32,11 +33,14 @@ class _End:
     count: int = 0
     run: int = 0  # samples at that value right before the next batch
 
-    def add(self, values: FloatArray) -> None:
-        most = float(values.max())
+    def reaches(self, most: float) -> bool:
+        """Tell whether values up to ``most`` have to be looked at; where not, no run goes on."""
         if most < self.least or most < self.value * (1.0 - SAME):
             self.run = 0
-            return
+            return False
+        return True
+
+    def add(self, values: FloatArray, most: float) -> None:
         if most > self.value * (1.0 + SAME):
             self.value, self.count, self.run = most, 0, 0
         is_end = values >= self.value * (1.0 - SAME)
@@ -81,8 +85,11 @@ class InertialTally:
             if values is not None and len(values):
                 least = LEAST_RATE_DPS if name.startswith(("rate", "delta_angle")) else LEAST_ACCEL_MPS2
                 high, low = self._ends.setdefault(name, (_End(least), _End(least)))
-                high.add(values)
-                low.add(-values)
+                most, lowest = float(values.max()), float(values.min())
+                if high.reaches(most):
+                    high.add(values, most)
+                if low.reaches(-lowest):
+                    low.add(-values, -lowest)
 
     def at_end(self, name: str) -> int:
         """Return how many samples of a field met the end of the range."""
@@ -96,7 +103,8 @@ def _rate_of(name: str, column: Column, batch: RecordBatch) -> FloatArray | None
     Those of increments are means over their interval.
     """
     if name.startswith(("rate_", "accel_")):
-        values = column.values[column.mask].astype(np.float64)
+        values = column.values if column.present is None else column.values[column.present]
+        values = values.astype(np.float64, copy=False)
     elif name.startswith("delta_"):
         interval = batch.columns.get("velocity_interval_s") if name.startswith("delta_velocity") else None
         interval = interval or batch.columns.get("interval_s")
@@ -108,4 +116,5 @@ def _rate_of(name: str, column: Column, batch: RecordBatch) -> FloatArray | None
         values = values * DEG_PER_RAD if name.startswith("delta_angle") else values
     else:
         return None
-    return values[np.isfinite(values)]
+    is_finite = np.isfinite(values)
+    return values if is_finite.all() else values[is_finite]

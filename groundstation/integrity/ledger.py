@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.gaps import Gaps, Pause
 from groundstation.base.ledger import (
     DamageEntry,
@@ -336,8 +337,7 @@ def topic_ledger(
 
     There is at least one time.
     """
-    span_ns = int(rhythm.steps_ns.sum())
-    ahead = rhythm.ahead
+    span_ns, ahead = rhythm.span_ns, rhythm.ahead
     return TopicCounts(
         topic,
         rows=len(time_ns),

@@ -8,11 +8,11 @@ is a pause also when recording goes on without an arm: a failed arming is logged
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.gaps import Pause
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.signals import EVENT_SEPARATOR, is_canonical, kind_of

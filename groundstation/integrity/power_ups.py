@@ -6,12 +6,13 @@ those before it: it goes on, it is the same counter behind its wrap, or it is an
 
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 from groundstation.base.timescales import GPS_EPOCH_NS, leap_seconds_at
 from groundstation.base.units import NS_PER_S

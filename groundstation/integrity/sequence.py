@@ -1,11 +1,12 @@
 """Lost records by record counters and by the recorder's own counters of losses."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from fnmatch import fnmatchcase
 from functools import lru_cache
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.ledger import CounterEntry
 from groundstation.base.records import Column, Int64Array, RecordBatch
 from groundstation.integrity.clock import ClockModel

@@ -1,10 +1,11 @@
 """Clock of a source: one model, made of one part for each power-up."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Column, Int64Array, LogHeader, NewLog
 from groundstation.base.sorted_values import distinct
 from groundstation.base.units import NS_PER_S

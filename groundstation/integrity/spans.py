@@ -2,11 +2,11 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.ledger import DamagedSpan, Truncation
 from groundstation.base.records import Column, Damage, Int64Array, frozen
 from groundstation.base.timescales import iso_to_utc_ns

@@ -5,12 +5,12 @@ Nothing is called stuck without a witness: a parked aircraft, a held slow channe
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from groundstation.base.angles import direction_of, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import METRES_PER_DEG
 from groundstation.base.records import Int64Array, RecordBatch
 from groundstation.base.signals import kind_of
@@ -156,11 +156,10 @@ class Judge:
     def _long(self, name: str, constancy: Constancy) -> Iterator[ConstantStretch]:
         """Return the stretches that last, of a field that is not constant through the whole log."""
         times = self._limits.noise_times_usual if name in _NOISY else self._limits.times_usual
-        for stretch in constancy.stretches() if constancy.changes else ():
-            is_long = stretch.samples >= times * constancy.usual_samples(without=stretch)
+        for stretch in constancy.stretches(times) if constancy.changes else ():
             by_device_ns = stretch.last.device_ns - stretch.first.device_ns  # the clock is asked where it matters
             is_short = 0 <= by_device_ns < self._limits.min_s * NS_PER_S
-            if is_long and not is_short and self._seconds(stretch) >= self._limits.min_s:
+            if not is_short and self._seconds(stretch) >= self._limits.min_s:
                 yield stretch
 
     def _seconds(self, stretch: ConstantStretch) -> float:

@@ -9,12 +9,11 @@ the side and D = D0 cot(bearing) for the distance of an aircraft on the course; 
 that needs neither.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, frozen
 
 ITERATIONS, FIRST_DAMPING, SETTLED_M = 40, 1e-2, 0.01

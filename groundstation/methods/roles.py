@@ -5,9 +5,9 @@ offers it.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.methods.taxi.settings import TaxiLimits
 from groundstation.results.roles import HeadingByTrack
 from groundstation.tables.table import Flight

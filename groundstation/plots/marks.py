@@ -4,12 +4,13 @@ Every array has one dimension unless said otherwise; NaN is a gap. A mark withou
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 
 Floats: TypeAlias = NDArray[np.float64]

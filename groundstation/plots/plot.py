@@ -1,9 +1,9 @@
 """Plot: panels in rows, each with two axes and marks; sizes on paper in millimetres."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.plots.marks import AnyMark
 
 WIDTH_MM = 178.0  # the printable width of A4

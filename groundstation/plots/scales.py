@@ -1,10 +1,10 @@
 """Scales of axes: place of a value between the ends, and ends for an axis without any."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.plots.marks import Floats
 from groundstation.plots.plot import Scale
 from groundstation.plots.ranges import finite

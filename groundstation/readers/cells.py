@@ -9,16 +9,16 @@ cell stood that could not be read.
 import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from groundstation.base import arrow_compute as pc
 from groundstation.base import arrow_values as arrow
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import MAX_TEXT_CHARACTERS, BoolArray, Column, Int64Array
 from groundstation.base.timescales import iso_to_utc_ns

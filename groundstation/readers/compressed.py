@@ -11,11 +11,11 @@ import tempfile
 import weakref
 import zlib
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 import zstandard
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage
 from groundstation.readers.positioned import Positioned

@@ -1,10 +1,11 @@
 """Tables with UTC in whole seconds beside a counter that tells the fraction."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array, Remark, UtcReadings
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.days import DayCount

@@ -1,11 +1,12 @@
 """Days and weeks that pass in times of the day and of the week; a day told as text."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from datetime import datetime
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.months import with_number

@@ -9,11 +9,12 @@ the file is one, else as text.
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UnreadableLogError, near_names
 from groundstation.base.records import Damage, Item, LogHeader, Remark
 from groundstation.base.signals import RAW_PREFIX, TOPICS, field_of, kind_of

@@ -6,7 +6,7 @@ the unit point. ``record_index`` is the line number in the file (from 1).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import islice
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from groundstation.base import arrow_values as arrow
 from groundstation.base.atmosphere import pressure_altitude_m
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import NO_POSITION
 from groundstation.base.records import Column, Int64Array, Item, LogHeader, RecordBatch, Remark, UtcReadings
 from groundstation.base.timescales import gps_week_to_utc_ns

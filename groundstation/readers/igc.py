@@ -8,13 +8,14 @@ Source: FAI Gliding Commission, Technical Specification for IGC-Approved GNSS Fl
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from datetime import datetime
 from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import NO_POSITION
 from groundstation.base.records import Column, Int64Array, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.signals import EVENT_SEPARATOR

@@ -3,11 +3,12 @@
 import io
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import accumulate
 from typing import Any, BinaryIO
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Damage
 from groundstation.readers.dialect import DELIMITERS
 from groundstation.readers.positioned import Positioned

@@ -1,7 +1,7 @@
 """Layout of a delimited table: canonical field of each column, and form of the time."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from types import MappingProxyType
 from typing import Literal, TypeAlias
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_360
 from groundstation.base.atmosphere import SEA_LEVEL_PA, pressure_altitude_m
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column
 from groundstation.base.signals import Field
 

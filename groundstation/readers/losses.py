@@ -1,11 +1,11 @@
 """Count of what a reader could not read, and where; many alike losses give one line."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Damage
 
 

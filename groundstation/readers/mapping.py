@@ -4,7 +4,7 @@ All readers whose logs name their messages share it: a reader states its roles a
 """
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from types import MappingProxyType
 from typing import Protocol, TypeAlias
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.base.atmosphere import pressure_altitude_m
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Column, Remark
 
 Columns: TypeAlias = dict[str, Column]

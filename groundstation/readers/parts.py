@@ -1,13 +1,13 @@
 """Merge of what several sources give to one topic, in the order of the log."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import (
     MAX_BATCH_ROWS,
     BoolArray,

@@ -6,10 +6,11 @@ docs/profiles.md describes every key of the TOML files that ``profile_file`` rea
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from types import MappingProxyType
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.signals import Field
 from groundstation.readers.layout import Form, Key
 

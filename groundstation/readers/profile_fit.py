@@ -3,9 +3,10 @@
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.source_units import PREFIX, units_entry
 from groundstation.readers.dialect import (
     DELIMITERS,

@@ -5,10 +5,10 @@ A profile is loaded where its head fits: most tables are those of none.
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_text import toml_table, toml_text
 from groundstation.readers.dialect import HeadLine, detect_encoding, head_lines
 from groundstation.readers.source import Source

@@ -1,10 +1,11 @@
 """Layout of a table by a profile: the column of each field, as the header states it."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Remark
 from groundstation.base.signals import field_of
 from groundstation.readers.days import day_ns

@@ -6,7 +6,6 @@ fails never hides the others.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cache
 from itertools import chain
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
 from groundstation.base.plug_ins import load_plug_ins
 from groundstation.base.records import Item, RecordBatch, Remark

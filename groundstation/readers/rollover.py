@@ -8,10 +8,10 @@ Source: u-blox, GPS week number rollover workaround (UBX-19016936); gpsd, timeba
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Remark
 from groundstation.base.timescales import (
     ROLLOVER_NS,

@@ -1,11 +1,11 @@
 """Shape of rows: where lines end, and how many cells they have."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from groundstation.base.compile import in_place
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 
 COMPILED_BYTES = 1 << 20  # below it numpy takes a moment, and a compiler some seconds once

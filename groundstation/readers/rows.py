@@ -8,12 +8,12 @@ one flipped bit costs a row or a cell, never the rest of a block, and the CSV pa
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.readers.dialect import Dialect, normal_form

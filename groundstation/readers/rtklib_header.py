@@ -7,10 +7,11 @@ Source: Takasu, RTKLIB ver. 2.4.2 manual (2013), appendix B.1; solution.c and po
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.ecef import geodetic_deg_m
 from groundstation.base.records import Damage
 from groundstation.readers.dialect import HeadLine, head_lines

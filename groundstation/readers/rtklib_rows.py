@@ -3,13 +3,13 @@
 import io
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.ecef import ecef_from_n, ecef_m, geodetic_deg_m
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.geodesy import NO_POSITION

@@ -9,12 +9,12 @@ since the start (milliseconds, 4 bytes) and the length of the log behind it (4 o
 """
 
 import struct
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column, Int64Array, Remark
 from groundstation.base.timescales import gps_to_utc_ns
 from groundstation.base.units import NS_PER_S

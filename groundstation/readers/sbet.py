@@ -10,7 +10,6 @@ Source: Applanix, POSPac MMS file formats (SBET, SMRMSG).
 
 import re
 from collections.abc import Generator, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.geodesy import NO_POSITION, curvature_radii_m
 from groundstation.base.records import MAX_BATCH_ROWS, Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark

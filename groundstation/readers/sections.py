@@ -6,11 +6,12 @@ columns, other units, another time zero.
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import BinaryIO
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Damage, Remark
 from groundstation.readers.dialect import Dialect, HeadLine
 from groundstation.readers.layout import TableLayout

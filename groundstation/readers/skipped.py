@@ -4,9 +4,10 @@ The first stretches are reported one by one, the others together.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Damage
 
 STRETCHES_SHOWN = 20

@@ -5,11 +5,11 @@ Files in gzip and zstd are seen decompressed.
 
 import io
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, BinaryIO, Protocol, runtime_checkable
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.reading import open_to_read
 from groundstation.base.records import Damage, Item

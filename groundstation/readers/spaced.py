@@ -7,7 +7,6 @@ a temporary file where they are many.
 
 import io
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.compile import in_place
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray
 from groundstation.readers.held import HeldBytes, HeldView
 from groundstation.readers.positioned import Positioned

@@ -5,9 +5,9 @@
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.units import CONVERSIONS
 
 HPA_PER_INHG = 33.8638866667

@@ -7,13 +7,14 @@ above it, and each is a log of its own.
 
 import io
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
 
 from groundstation.base import arrow_values as arrow
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array, Remark
 from groundstation.readers.cells import trimmed
 from groundstation.readers.dialect import Dialect

@@ -1,9 +1,10 @@
 """Plots of a report as pictures, with the panels that a page draws live over them."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.failures import attempt
 from groundstation.chapters.parts import Figure, Part, Section, kept
 from groundstation.plots.plot import Plot

@@ -5,9 +5,9 @@ Made from the saved results alone.
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.failures import Failure, attempt, failures, gathered_failures
 from groundstation.chapters.by_answer import answer_chapters
 from groundstation.chapters.front import front

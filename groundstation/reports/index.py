@@ -4,10 +4,11 @@ The rows are those of one folder.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from pathlib import Path
 from typing import Any, Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.digits import digits_of
 from groundstation.base.printable import csv_cell
 from groundstation.base.serial import to_json_exactly

@@ -8,11 +8,13 @@ frames of its axes are kept. The numbers are those that the picture shows, as fl
 import base64
 import json
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from groundstation.base.dataclasses import dataclass
 
 TIME = "flight time"  # what samples are of that tell it
 FloatArray = NDArray[np.float64]

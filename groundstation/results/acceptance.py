@@ -1,9 +1,10 @@
 """Answer of an acceptance: INS figures of a folder of flights against a standard's limits."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import check_ranges, number, required_number
 from groundstation.results.arrays.acceptance import AcceptanceCurves, AcceptanceGrowth

@@ -1,8 +1,8 @@
 """Two analyses of one log that answer the same question: agreement within intervals."""
 
 import math
-from dataclasses import dataclass
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 
 AGREE_SIGMAS, CONTRADICT_SIGMAS = 2.0, 3.0

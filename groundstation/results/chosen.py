@@ -5,9 +5,9 @@ They come from the configuration of a run, and are given to the methods in fligh
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 
 Use = Literal["exclude", "force"]

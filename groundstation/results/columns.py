@@ -1,9 +1,9 @@
 """Columns of the tables of flights: index.json, index.csv and fleet.parquet."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeVar
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.answer import Answer
 from groundstation.results.roles import LETTERS
 

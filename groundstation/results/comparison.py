@@ -1,11 +1,12 @@
 """Answer of ``compare``: two saved flights with their clocks aligned, everywhere B less A."""
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any, Literal, TypeAlias, TypeGuard
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.findings import Finding
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.results.figures import FigureData

@@ -1,10 +1,9 @@
 """Corrected position of an unaided INS, as pages and recordings draw it, and its tracks."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.ellipse import ELLIPSE_95, fits, magnified
 from groundstation.results.flight import FlightResults
 

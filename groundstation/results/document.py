@@ -4,10 +4,11 @@ The schema is generated from them and from the answers' types.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, ClassVar
 
 from groundstation.base.clock import Clock
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
 from groundstation.results.flight import NotAssessable, Source, Status

@@ -1,13 +1,14 @@
 """Answers over a fleet of flights, for the fleet report, fleet.rrd and notebooks."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UnknownNameError
 from groundstation.base.records import frozen
 from groundstation.base.serial import to_json

@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.fleet_units import UnitOfFlight
 
 NORMAL_95 = 1.959964

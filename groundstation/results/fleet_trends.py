@@ -1,7 +1,8 @@
 """Trends of the flights of an aircraft: changes of level, slopes, date of a limit."""
 
-from dataclasses import dataclass
 from typing import Literal
+
+from groundstation.base.dataclasses import dataclass
 
 NS_PER_DAY = 86_400_000_000_000
 DAYS_PER_YEAR = 365.25

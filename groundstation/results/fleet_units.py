@@ -1,9 +1,10 @@
 """INS units of a fleet by serial: where each sat, how its errors change, date of a limit."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal, NamedTuple
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import check_ranges, number, required_number
 from groundstation.results.arrays.typed import Arrays, Floats, Texts, Times

@@ -1,13 +1,14 @@
 """All results of one flight in one frozen object, for the recording and the report."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.clock import Clock
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UnknownNameError
 from groundstation.base.failures import attempt
 from groundstation.base.findings import Finding

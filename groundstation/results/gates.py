@@ -4,10 +4,11 @@ Reasons that name gates are put in plain words for readers who do not know the m
 """
 
 import math
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+
+from groundstation.base.dataclasses import dataclass
 
 GateState = Literal["passed", "failed", "not_measured"]
 Sense = Literal["at_most", "at_least", "between"]

@@ -1,10 +1,11 @@
 """File of installations: how each INS sits in its aircraft, and the heading errors by it."""
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import ClassVar
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.serial import MismatchError, from_json, to_json
 from groundstation.results.roles import IntervalPart

@@ -12,13 +12,13 @@ category II and III are "ILS look-alike" values: derived from what an ILS delive
 range system of its own. Tolerance of the mean course line of an ILS at the threshold: ICAO Annex 10, volume I, 3.1.3.6.
 """
 
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import frozen
 

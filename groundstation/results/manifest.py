@@ -1,9 +1,10 @@
 """manifest.json: time, place and versions of a run, and results a later run can reuse."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.serial import LEFT_OUT_WHEN_DEFAULT
 
 

@@ -5,12 +5,12 @@ An answer that plays a role is derived from it. A reader finds it with
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.arrays.states import BodyStates
 from groundstation.results.gates import Gate
 

@@ -3,8 +3,7 @@
 They are judged from stored values.
 """
 
-from dataclasses import dataclass
-
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.gates import Gate
 
 

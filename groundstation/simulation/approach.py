@@ -3,13 +3,14 @@
 The motion is that along a final.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.base.records import Column, Int64Array

@@ -3,13 +3,13 @@
 The filter's model is exactly true of the errors that it makes.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.compile import compiled
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 from groundstation.base.units import MPS2_PER_G
 from groundstation.simulation.ins_class import InsClass

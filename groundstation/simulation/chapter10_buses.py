@@ -1,12 +1,13 @@
 """Buses of a flight written as Chapter 10: the topics on each, and the ICD."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import kind_of, topics_of_kind
 from groundstation.readers.icd import (

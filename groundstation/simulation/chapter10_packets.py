@@ -6,12 +6,13 @@ Source: IRIG 106-17, chapter 10 (file) and chapter 11 (packets): 11.2.1 header, 
 format 1, 11.2.4.1 1553 format 1, 11.2.8.1 ARINC 429 format 0.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from datetime import UTC, datetime
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 from groundstation.base.units import NS_PER_S
 

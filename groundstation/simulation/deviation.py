@@ -4,11 +4,11 @@ They are without noise.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, direction_of, unwrap, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 from groundstation.simulation.magnetometer import sensed_nt, world_field_nt
 from groundstation.simulation.scenario import MagnetometerSettings, Scenario

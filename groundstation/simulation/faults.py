@@ -4,12 +4,13 @@ Truth is never damaged but for the rows that a doubled or re-timed log row carri
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar, TypeAlias
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.geodesy import curvature_radii_m
 from groundstation.base.records import BoolArray, Column, Int64Array

@@ -1,11 +1,12 @@
 """Whole simulated flight: true motion and every sensor, on the rows of one log."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from types import MappingProxyType
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.simulation.deviation import scenario_deviation

@@ -4,11 +4,11 @@ They are the closed Schuler solution of its settings, or the full truth of a cla
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.units import MPS2_PER_G, NS_PER_S
 from groundstation.simulation.readings import generator
 from groundstation.simulation.scenario import InsSettings

@@ -4,7 +4,6 @@ The valve hangs, so that it leans with the aircraft in a turn; its reading is di
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from groundstation.base.angles import FloatArray, unwrap, wrap_180, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.declination import declination_along
 from groundstation.base.geodesy import SEMI_MAJOR_M
 from groundstation.base.records import Column

@@ -5,13 +5,14 @@ number of runs; each kind of randomness has its own stream, so that a switch cha
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from typing import Literal
 from zlib import crc32
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 from groundstation.base.toml_settings import check_ranges, number
 from groundstation.base.units import MPS2_PER_G

@@ -3,12 +3,13 @@
 They ship as TOML beside this module, one file a class.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.toml_settings import number, required_number, settings_from
 

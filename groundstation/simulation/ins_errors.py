@@ -12,12 +12,13 @@ and position errors in the local geographic frame); the same in Groves, Principl
 Integrated Navigation Systems, 2nd ed. 2013, section 14.2.4, with the opposite sign of the attitude error.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.compile import compiled
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.geodesy import EARTH_RATE_RADPS, ECCENTRICITY_SQUARED, FLATTENING, SEMI_MAJOR_M
 from groundstation.base.gravity import GEODETIC_RATIO, GRAVITY_EQUATOR_MPS2, SOMIGLIANA

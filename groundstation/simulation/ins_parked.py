@@ -5,7 +5,7 @@ does. What breaks the assumptions of an estimator: an aircraft that rocks in the
 aligns, sensors that warm up.
 """
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from typing import Literal
 from zlib import crc32
 
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.geodesy import displaced_deg
 from groundstation.base.records import Column, frozen

@@ -4,11 +4,10 @@ The runway is where the flight lands: its course is the track at touchdown, its 
 the touchdown and to a stated side of it, so that a scenario lands off the centre line without flying otherwise.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray, direction_of, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.geodesy import curvature_radii_m
 from groundstation.base.records import Column

@@ -3,8 +3,7 @@
 The altimeter is a radio altimeter.
 """
 
-from dataclasses import dataclass
-
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_settings import number, required_number
 
 

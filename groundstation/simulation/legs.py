@@ -4,11 +4,12 @@ On the ground the state is ground speed along the track; in the air it is airspe
 velocity, so that a turn at constant bank is one in the air mass and the wind adds to the ground velocity.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar, TypeAlias
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.geodesy import SEMI_MAJOR_M, curvature_radii_m
 from groundstation.base.toml_settings import number, required_number

@@ -6,11 +6,12 @@ several headings, further figure-eights.
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.declination import NORTH_EAST_DOWN_SIGMA_NT
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import check_ranges, number

@@ -3,11 +3,12 @@
 The grid is one of times.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, direction_of, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.records import BoolArray
 from groundstation.base.units import NS_PER_S

@@ -4,13 +4,14 @@ They are not yet put together into a log.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from types import MappingProxyType
 from zlib import crc32
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column, Int64Array, frozen
 from groundstation.base.units import NS_PER_S
 from groundstation.simulation.trajectory import Trajectory

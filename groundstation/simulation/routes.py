@@ -5,13 +5,13 @@ heading follows the geodesic (great circle) between turns and the position is in
 heading = track. Turns are coordinated: tan(bank) = speed x turn rate / g.
 """
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
 from groundstation.base.compile import compiled
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import ECCENTRICITY_SQUARED, SEMI_MAJOR_M
 from groundstation.base.records import frozen
 from groundstation.base.units import MPS2_PER_G

@@ -8,13 +8,13 @@ Source: Vallado, Fundamentals of Astrodynamics and Applications, 4th ed. 2013, s
 (sidereal time, equation 3-45) and 9.6 (secular rates due to J2, equations 9-37 to 9-39).
 """
 
-from dataclasses import dataclass
 from functools import cache
-from importlib import resources
+from pathlib import Path
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.geodesy import EARTH_RATE_RADPS, SEMI_MAJOR_M
 from groundstation.base.timescales import iso_to_utc_ns
@@ -48,7 +48,7 @@ class Orbit:
 @cache
 def orbits() -> dict[str, Orbit]:
     """The shipped orbits by name: ``GPS-13``, ``GLO-730``."""
-    text = (resources.files("groundstation.simulation") / "orbits" / "satellites.csv").read_text(encoding="utf-8")
+    text = Path(__file__).with_name("orbits").joinpath("satellites.csv").read_text(encoding="utf-8")
     rows = [line.split(",") for line in text.splitlines() if line and not line.startswith("#")][1:]
     found = {}
     for name, _catalogue, epoch, *elements in rows:

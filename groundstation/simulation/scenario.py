@@ -4,11 +4,12 @@ They are frozen dataclasses read from TOML.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from pathlib import Path
 from typing import Any, Literal
 
 from groundstation.base.angles import wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, SettingsError
 from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.signals import TOPICS, field_of

@@ -1,10 +1,9 @@
 """Simulated sessions of several aircraft: inputs of the estimators, and the truth."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.ecef import ecef_from_n, geodetic_deg_m
 from groundstation.base.records import frozen
 from groundstation.simulation.session_errors import VehicleErrors, draw_errors

@@ -9,11 +9,12 @@ Source: Van Loan, Computing integrals involving the matrix exponential, 1978 (th
 form); Gelb, Applied Optimal Estimation, 1974, section 3.8.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 from groundstation.simulation.ins_errors import InsErrors, SensorErrors, TrueMotion, propagate
 from groundstation.simulation.processes import gauss_markov

@@ -4,13 +4,13 @@ The link is shared in slots.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.simulation.satellites import elevation_deg, emission_ecef_m, orbit_of

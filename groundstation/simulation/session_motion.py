@@ -3,12 +3,12 @@
 It is straight flight and turns at constant speed and height.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.ecef import ecef_from_n, ecef_m, geodetic_deg_m
 from groundstation.base.geodesy import curvature_radii_m
 from groundstation.base.records import frozen

@@ -1,9 +1,10 @@
 """Scenarios of a session of several aircraft, as frozen dataclasses read from TOML."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.toml_settings import check_ranges, number, required_number, settings_from

@@ -4,7 +4,7 @@ They are of the family of docs/evidence/heading.md.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Literal
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.base.records import BoolArray, Column, frozen
 from groundstation.base.units import NS_PER_S

@@ -4,12 +4,13 @@ The first family of taxi runs leaves them out. docs/evidence/heading.md tells th
 are its cells.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.metar import MPS_PER
 from groundstation.simulation.processes import gauss_markov
 

@@ -4,11 +4,11 @@ The motion is along a straight runway whose ground rises and is not plane.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.base.records import Column
 from groundstation.base.timescales import iso_to_utc_ns

@@ -10,11 +10,12 @@ Rotation of the north-east-down frame below the aircraft (0.00005 m/s on a 5 m a
 modelled.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, direction_of, wrap_180, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import curvature_radii_m
 from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.base.units import MPS2_PER_G

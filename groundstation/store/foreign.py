@@ -7,7 +7,6 @@ chunk whose checksum is wrong is lost. The sequence numbers of a channel show wh
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import BinaryIO, TypeAlias
 
 import lz4.frame
@@ -16,14 +15,13 @@ import zstandard
 from mcap.opcode import Opcode
 from mcap.records import Channel, Header, Schema
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
+from groundstation.store.decompress import MAX_CHUNK_BYTES, ChunkError, decompress
 from groundstation.store.framing import (
-    MAX_CHUNK_BYTES,
     MAX_RECORD_BYTES,
-    ChunkError,
     ChunkHead,
     Summary,
-    decompress,
     ends_whole,
     parse_record,
     parse_records,

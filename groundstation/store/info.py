@@ -3,11 +3,12 @@
 import json
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from types import MappingProxyType
 from typing import Any
 
 from groundstation.base.clock import Clock
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
 from groundstation.base.salvage import salvaged

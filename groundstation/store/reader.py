@@ -5,13 +5,14 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 from mcap.records import Channel, Schema
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.records import MAX_BATCH_ROWS, Damage, Item, LogHeader, RecordBatch
 from groundstation.base.timescales import utc_ns_to_iso

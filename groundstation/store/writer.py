@@ -12,7 +12,6 @@ from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from threading import local
 from types import TracebackType
@@ -35,6 +34,7 @@ from mcap.records import (
 )
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import RecordBatch
 from groundstation.base.signals import is_canonical, kind_of

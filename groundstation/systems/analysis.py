@@ -3,10 +3,11 @@
 import dataclasses
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar, cast
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.findings import Finding
 from groundstation.base.words import capitalised
 from groundstation.results.answer import Answer, Answers

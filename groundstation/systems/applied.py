@@ -5,8 +5,9 @@ A system that has one gives it.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+
+from groundstation.base.dataclasses import dataclass
 
 if TYPE_CHECKING:
     from groundstation.base.records import RecordBatch

@@ -4,10 +4,10 @@ The pipeline converts the logs, moves their records onto one clock and writes th
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 from groundstation.base.clock import Clock
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.findings import Finding
 from groundstation.base.records import Int64Array

@@ -5,9 +5,9 @@ of the flights; the system makes lessons and answers.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.installations import Installation, LearnedHeading, Lesson
 
 if TYPE_CHECKING:

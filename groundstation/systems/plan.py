@@ -1,9 +1,9 @@
 """Plan as one object: its scenario, how it is made, its line for the terminal."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.findings import Finding
 from groundstation.results.answer import Answer, Answers
 from groundstation.results.figures import FigureData

@@ -1,9 +1,9 @@
 """Scenarios of plans: the shipped ones, by name, and a user's own."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.toml_settings import settings_from
 from groundstation.systems.plan import Plan, ScenarioT

@@ -6,11 +6,11 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.parts import Grid, Head, Note, Part, Section
 from groundstation.results.figures import FigureData

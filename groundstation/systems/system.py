@@ -5,10 +5,11 @@ page the chapters and plots, a recording the tabs, a study its own simulation.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.answer import Answer, PlanAnswer, SessionAnswer
 from groundstation.systems.analysis import Analysis
 from groundstation.systems.plan import Plan

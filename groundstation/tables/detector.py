@@ -5,11 +5,10 @@ standstills that only a parked vehicle shows and is carried from there, forward 
 is that of something rolling on a surface. Every rule may refuse ground that was ground; none may pass air for ground.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, frozen
 from groundstation.tables.motion import (
     RATE_HZ,

@@ -9,11 +9,10 @@ and commit 9e73155 of 2014-12-01; ATT.AEKF from 4.1 on. PX4-Autopilot, parameter
 ATT_EN.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.ardupilot_codes import ESTIMATORS
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.tables.parameters import Parameters, parameters_of
 from groundstation.tables.table import Flight

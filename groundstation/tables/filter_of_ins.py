@@ -1,8 +1,8 @@
 """Filter that an INS topic is the output of, and whether it flew the aircraft."""
 
 import re
-from dataclasses import dataclass
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.signals import topics_of_kind
 from groundstation.tables.estimator_in_use import SIMULATOR, estimator_in_use
 from groundstation.tables.table import Flight

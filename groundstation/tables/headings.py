@@ -1,10 +1,9 @@
 """True heading of a flight: logged, or magnetic heading with declination."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray, unwrap, wrap_180, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.declination import declination_along
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import frozen

@@ -4,10 +4,11 @@ They come from speed, height and their rates, by the kind of vehicle. They name 
 ground contact reads them.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, frozen
 from groundstation.tables.detector import Detection, GroundSettings, detect_ground, lasting
 from groundstation.tables.motion import RATE_HZ, Motion, largest_over_sources, runs, window_sum

@@ -1,12 +1,12 @@
 """Motion of a flight on a coarse, even grid of times, for the ground detector and phases."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, unwrap
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import north_east_m
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.tables.sources import sources_of_kind

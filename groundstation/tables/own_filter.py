@@ -5,11 +5,10 @@ Source: PX4-Autopilot, EKF2, messages EstimatorInnovations and ekf2_innovations;
 log messages EKF3/EKF4, NKF3/NKF4 and XKF3/XKF4 (innovations in m and m/s; SP, SV: square roots of the test ratios).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array, frozen
 from groundstation.tables.resample import values_at
 from groundstation.tables.table import Flight, Table

@@ -5,13 +5,13 @@ as PARAM_VALUE, which tells no defaults.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.tables.table import Flight, Table
 
 ULOG, DATAFLASH, MAVLINK = "raw.ulog.parameters", "raw.PARM", "raw.PARAM_VALUE"

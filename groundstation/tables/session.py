@@ -4,13 +4,14 @@ Vehicles, satellites and ground points come and go: one is there while its table
 since the start of the session. Positions are in one frame for all: ECEF, or a local north-east-down frame.
 """
 
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 
 Frame = Literal["ecef", "local"]

@@ -4,11 +4,12 @@ Parts that could not be used become findings.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.datums import BY_NAME
 from groundstation.base.ecef import ecef_m, geodetic_deg_m
 from groundstation.base.findings import Finding

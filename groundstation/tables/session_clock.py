@@ -10,11 +10,11 @@ recorder has for the link and not for the INS.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import LIGHT_MPS, NS_PER_S

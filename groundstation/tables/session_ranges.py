@@ -1,11 +1,11 @@
 """Ranges of a session from the link topics of its logs, and the faults of some of them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.findings import Finding
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.signals import topics_of_kind

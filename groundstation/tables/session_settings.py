@@ -2,8 +2,9 @@
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.datums import BY_NAME
 from groundstation.base.errors import SettingsError
 from groundstation.base.local_frame import LocalFrame

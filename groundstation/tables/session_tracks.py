@@ -1,11 +1,11 @@
 """Dead reckoning and truth of one log in the frame and on the clock of its session."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.ecef import ecef_from_n, ecef_m
 from groundstation.base.local_frame import LocalFrame, heading_of, level_direction
 from groundstation.base.records import BoolArray, Int64Array

@@ -3,11 +3,11 @@
 The kind of an INS, by its log: whether GNSS corrects it, and how often its mode says so.
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import HEADING_IS_TRACK
 from groundstation.base.signals import topics_of_kind

@@ -1,7 +1,7 @@
 """A table: the samples of one topic as named numpy columns on the corrected clock."""
 
 from collections.abc import Callable, Hashable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from importlib.util import find_spec
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, cast
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError, UnknownNameError, UsageError
 from groundstation.base.gaps import Pause
 from groundstation.base.records import BoolArray, Column, Int64Array, frozen

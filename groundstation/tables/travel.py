@@ -3,11 +3,10 @@
 They serve to find its kind and its likely phases; they prove nothing.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray
 from groundstation.base.signals import topics_of_kind
 from groundstation.tables.motion import (

@@ -6,11 +6,11 @@ phases and says which are likely; it proves no ground contact.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray
 from groundstation.base.signals import topics_of_kind
 from groundstation.tables.detector import Detection

@@ -1,10 +1,9 @@
 """Weight on wheels and landed flags, and whether they can be believed."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S

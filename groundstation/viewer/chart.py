@@ -5,13 +5,13 @@ what they are.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from textwrap import wrap
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.chapters.wording import clock
 from groundstation.plots.plot import Scale
 from groundstation.plots.ranges import thin

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from datetime import UTC as UTC_ZONE
 from datetime import datetime
 from importlib import metadata
@@ -14,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 from rerun.chunk import Chunk, RrdReader
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.viewer.recorder import UTC
 
 MAGIC = b"RRF2"  # the file's first bytes; behind them a byte each of major, minor and patch version

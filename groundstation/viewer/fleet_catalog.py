@@ -7,7 +7,6 @@ import socket
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -16,6 +15,7 @@ from rerun.catalog import DatasetEntry
 from rerun.chunk import RrdReader
 from rerun.server import Server
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.viewer.catalog_table import save_flight_table
 from groundstation.viewer.fleet import FLEET, FLIGHTS_TEXT

@@ -1,11 +1,12 @@
 """Charts of a fleet by flight number: the plots of its page, and verdict lanes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import rerun.blueprint as rrb
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.words import capitalised
 from groundstation.chapters.fleet.common import title_of
 from groundstation.chapters.fleet.trend import QUANTITIES

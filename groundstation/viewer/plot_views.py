@@ -6,12 +6,13 @@ outage is a lane of its own.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import groupby
 
 import numpy as np
 import rerun.blueprint as rrb
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.words import capitalised
 from groundstation.plots import extents
 from groundstation.plots.marks import Band, Curve, Dots, Lanes, Limit, Mark, Points, Spans

@@ -1,7 +1,6 @@
 """Recorder of one flight for Rerun: every tab logs with it, on both timelines."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,6 +8,7 @@ import rerun as rr
 from numpy.typing import ArrayLike, NDArray
 from rerun.components import AggregationPolicy, InterpolationMode
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.system import Systems

@@ -6,7 +6,7 @@ of that row. Some rows give the displaced threshold in place of the end; the sam
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from typing import Literal
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, direction_of, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import METRES_PER_DEG, latitude_longitude_deg, north_east_m
 from groundstation.base.records import BoolArray
 

@@ -1,12 +1,12 @@
 """Chapter: every flight and what is out of the ordinary about it."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.chapters.fleet.common import aircraft_name, bounded, minute, title_of
 from groundstation.chapters.fleet.reasons import reasons_of
 from groundstation.chapters.gates import VERDICTS

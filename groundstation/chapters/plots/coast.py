@@ -1,11 +1,11 @@
 """Coastline beneath a map in metres north and east of the start."""
 
-from dataclasses import dataclass
 from math import hypot
 
 import numpy as np
 
 from groundstation.base.coastline import COARSE_M, ERROR_M, NAME, coastline_near
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import plan_north_east_m
 from groundstation.chapters.wording import number
 from groundstation.plots.marks import Floats, Outlines

@@ -1,13 +1,13 @@
 """Plots of a comparison: curves of two flights over each other."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, Generic, NamedTuple
 
 import numpy as np
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import north_east_m, on_earth, plan_north_east_m
 from groundstation.chapters.plots.common import M_PER_KM, has_values
 from groundstation.plots.axes import time_axis

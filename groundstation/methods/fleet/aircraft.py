@@ -1,11 +1,11 @@
 """Mean error of an aircraft over its flights, with an interval by the spread of flights."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import student_quantile
 from groundstation.methods.fleet.moments import moments_of
 

@@ -1,11 +1,11 @@
 """Changes of level in a series of flights, and the control chart between them."""
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.methods.fleet.robust import (
     VALUES_PER_FREEDOM_STEP,
     limit_in_sigmas,

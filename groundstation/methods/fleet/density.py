@@ -1,12 +1,12 @@
 """Densities of many flights on one grid, merged from histograms on a fine lattice."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.methods.fleet.moments import Moments
 from groundstation.results.fleet import Densities
 

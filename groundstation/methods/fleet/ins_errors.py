@@ -1,11 +1,11 @@
 """Errors of an INS over the hours it navigates, of one flight and of many together."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import continuous_longitude_deg, curvature_radii_m
 from groundstation.base.records import frozen
 from groundstation.base.units import M_PER_NAUTICAL_MILE

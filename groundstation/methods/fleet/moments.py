@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+
+from groundstation.base.dataclasses import dataclass
 
 
 @dataclass(frozen=True)

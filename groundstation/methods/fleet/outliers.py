@@ -1,11 +1,11 @@
 """Flights whose figures are far from those of the same aircraft."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.methods.fleet.robust import VALUES_PER_FREEDOM_MAD, limit_in_sigmas, sigma_of_spread
 
 FloatArray = NDArray[np.float64]

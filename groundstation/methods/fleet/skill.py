@@ -3,12 +3,13 @@
 import math
 from array import array
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.fleet import WHOLE_FLEET, FleetSkill
 from groundstation.results.fleet_share import SkillOfFlight
 from groundstation.results.forecast_methods import FORECAST_METHODS

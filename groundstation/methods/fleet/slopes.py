@@ -3,11 +3,12 @@
 Nothing is taken from what a flight claims of its own accuracy: flights of one unit differ by far more than that.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+
+from groundstation.base.dataclasses import dataclass
 
 FloatArray = NDArray[np.float64]
 NORMAL_TAIL = 1.959964  # two-sided 95 %

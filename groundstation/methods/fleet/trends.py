@@ -1,11 +1,11 @@
 """Trends of each aircraft: control charts, changes of level, slopes, date of a limit."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.methods.fleet.changes import ChangeSettings, ControlChart, control_chart
 from groundstation.methods.fleet.slopes import Line, line_of
 from groundstation.methods.fleet.unit_series import (

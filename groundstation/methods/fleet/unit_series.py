@@ -1,10 +1,11 @@
 """Series of a figure of one unit: changes of level, the line behind them, date of a limit."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.methods.fleet.changes import Change, ChangeSettings, find_changes
 from groundstation.methods.fleet.slopes import Line, line_of
 

@@ -4,7 +4,7 @@ import math
 import unicodedata
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from itertools import pairwise
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base import words
+from groundstation.base.dataclasses import dataclass
 from groundstation.methods.fleet.slopes import FEWEST
 from groundstation.methods.fleet.unit_series import (
     SeriesSettings,

@@ -3,10 +3,11 @@
 The covariances are those between the two epochs of a lag.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array, frozen
 from groundstation.methods.kalman.arrays import (
     Back,

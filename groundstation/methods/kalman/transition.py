@@ -3,12 +3,12 @@
 Dense ones are for a handful of states.
 """
 
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array, frozen
 from groundstation.methods.kalman.arrays import Dynamics, FloatArray, Pattern, States
 

@@ -9,11 +9,10 @@ The other sensor shows the reference as it was ``delay`` seconds ago, beside wha
 ``reference`` being the signal and what else may be in it (scale, azimuth error, antenna arm), each with a prior.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import student_quantile
 from groundstation.methods.lag.settings import LatencySettings
 from groundstation.methods.lag.windows import (

@@ -1,7 +1,6 @@
 """Settings of the latency estimator. Every limit of the method stands here."""
 
-from dataclasses import dataclass
-
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_settings import check_ranges, number
 
 SLOW_MPS = 3.0  # the track of a slower aircraft does not show where the nose points

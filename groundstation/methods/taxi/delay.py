@@ -1,7 +1,6 @@
 """Latency of GNSS behind the INS that is known before the turns of the taxi are used."""
 
-from dataclasses import dataclass
-
+from groundstation.base.dataclasses import dataclass
 from groundstation.methods.intervals import BOUND95
 from groundstation.results.roles import Delays
 

@@ -4,13 +4,14 @@ Each has the reason why it is used or not.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import direction_of, interpolate_heading, unwrap, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.signals import topics_of_kind

@@ -3,8 +3,9 @@
 The settings of a system have them among others.
 """
 
-from dataclasses import dataclass
 from typing import Literal, Protocol
+
+from groundstation.base.dataclasses import dataclass
 
 RateKind = Literal["slope", "raw"]
 

@@ -8,13 +8,14 @@ belong to the draws. Short runs and short standstills get heavier tails by thems
 The sampling itself is in ``sampling.py``.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.units import ARCMIN_PER_DEG, DEG_PER_RAD
 from groundstation.methods.taxi_error import noise
 from groundstation.methods.taxi_error.posterior import ErrorPosterior, even_draws

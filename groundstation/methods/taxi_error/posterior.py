@@ -1,10 +1,9 @@
 """Posterior of the heading error as a mixture of normal distributions, and its intervals."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.methods.intervals import mixture_quantile
 from groundstation.methods.taxi_error import noise
 from groundstation.methods.taxi_error.priors import PRIOR_MEAN, SPREAD

@@ -9,10 +9,11 @@ mode); E. Veach, L. Guibas, Optimally combining sampling techniques, 1995 (weigh
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from groundstation.base.dataclasses import dataclass
 
 FloatArray = NDArray[np.float64]
 LogDensity = Callable[[FloatArray], FloatArray]

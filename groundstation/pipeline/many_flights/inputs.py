@@ -5,9 +5,9 @@ Nothing that groundstation itself made is among them.
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UsageError
 from groundstation.pipeline.one_flight.log import as_log
 from groundstation.results.file_names import ARRAYS, CORRECTED, INDEX_CSV, INDEX_JSON, MANIFEST, OLD_ARRAYS, SUMMARY

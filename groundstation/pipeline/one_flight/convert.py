@@ -2,11 +2,12 @@
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.ledger import Ledger, TopicEntry

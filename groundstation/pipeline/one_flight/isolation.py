@@ -3,8 +3,7 @@
 Table ``[isolation]`` of the settings.
 """
 
-from dataclasses import dataclass
-
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_settings import check_ranges, number
 
 

@@ -1,9 +1,10 @@
 """Task of a run for one log; plain values, so that it travels to a worker process."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.log import as_log, digest_of, open_log
 from groundstation.pipeline.one_flight.resume import Finished, Keys, Step, keys_of

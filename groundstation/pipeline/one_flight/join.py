@@ -5,13 +5,14 @@ Each is converted and put on one clock, and its topics get names of their own.
 
 import hashlib
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, UnreadableLogError, UsageError
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import DamagedSpan, Ledger

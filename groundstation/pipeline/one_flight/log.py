@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.records import Item, RecordBatch
 from groundstation.base.signals import BUS_PREFIX

@@ -2,10 +2,11 @@
 
 import traceback
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, lack_of_memory
 from groundstation.base.failures import Failure
 from groundstation.base.failures import reason_of as why

@@ -1,8 +1,9 @@
 """Progress of a run as events: the pipeline sends them, the command line shows them."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from groundstation.base.dataclasses import dataclass
 
 if TYPE_CHECKING:
     from groundstation.pipeline.one_flight.outcome import Outcome

@@ -4,7 +4,7 @@ It is put on the flight's clock by UTC and kept as ``truth``.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +13,7 @@ import numpy as np
 
 from groundstation.base.angles import wrap_180
 from groundstation.base.climb import OPPOSITE, climb_agreement
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.findings import Finding
 from groundstation.base.geodesy import METRES_PER_DEG

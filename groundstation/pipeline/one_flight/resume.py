@@ -11,13 +11,14 @@ import json
 import os
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from functools import cache
 from importlib import metadata as installed
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.failures import is_incomplete
 from groundstation.base.findings import Finding

@@ -5,9 +5,10 @@ Whether it is read from the log or from its MCAP.
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.findings import Finding
 from groundstation.base.records import Damage, Item, LogHeader, NewLog, RecordBatch, Remark, UtcReadings
 from groundstation.base.signals import kind_of

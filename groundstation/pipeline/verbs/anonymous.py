@@ -10,7 +10,7 @@ import hmac
 import math
 import secrets
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -20,6 +20,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
 from groundstation.base.clock import Clock
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.declination import declination_along
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.ledger import DamagedSpan, Ledger

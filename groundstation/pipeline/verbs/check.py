@@ -4,11 +4,12 @@ It writes nothing.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from groundstation.base.clock import Clock
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UnreadableLogError, UsageError
 from groundstation.base.findings import SEVERITIES, Finding, worst
 from groundstation.base.ledger import DATA_LOST, Ledger
@@ -142,10 +143,10 @@ def require_purpose_of(purpose: str) -> bool:
     """
     if not purpose:
         return False
-    from groundstation.pipeline.verbs.usable import SESSION_PURPOSES, require_purpose
+    from groundstation.pipeline.verbs.usable import is_of_session, require_purpose
 
     require_purpose(purpose)
-    return purpose in SESSION_PURPOSES
+    return is_of_session(purpose)
 
 
 def check_here(

@@ -4,11 +4,12 @@ The process has a limit of time, or is isolated.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from groundstation.base.clock import Clock
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger

@@ -3,11 +3,12 @@
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError, UnreadableLogError, UsageError, told_in_a_line
 from groundstation.base.failures import Failure, attempt, failures, gathered_failures
 from groundstation.base.ledger import DamagedSpan, Ledger

@@ -1,12 +1,12 @@
 """Recorded logs to MCAP files, one by one; a flight to Chapter 10."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.base.signals import is_canonical
 from groundstation.integrity.limits import Thresholds

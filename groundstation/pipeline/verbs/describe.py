@@ -1,12 +1,13 @@
 """Description of a log for the verb ``info``: format, clock, span and topics."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
 from groundstation.base.records import Damage, RecordBatch

@@ -2,9 +2,9 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UsageError
 from groundstation.base.words import counted
 from groundstation.pipeline.many_flights.inputs import collect, is_ours, is_session, no_log

@@ -3,10 +3,11 @@
 import hashlib
 import platform
 import shutil
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.base.failures import attempt, failures, gathered_failures, is_incomplete, with_failures
 from groundstation.base.findings import worst

@@ -1,10 +1,10 @@
 """Verbs of ``profile``: profiles written for a table and tried on it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UsageError
 from groundstation.base.findings import Finding
 from groundstation.integrity.ledger_findings import damage_finding

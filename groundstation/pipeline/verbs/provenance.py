@@ -4,10 +4,10 @@ import os
 import platform
 import subprocess
 import sys
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.version import __version__
 
 CHECKOUT = Path(__file__).resolve().parents[3]

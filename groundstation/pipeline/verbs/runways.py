@@ -3,11 +3,11 @@
 import os
 import re
 import tempfile
-from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import Any
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, UnknownNameError, UsageError
 from groundstation.base.runways.kept import MOST_BYTES, bytes_of, shipped_runways, usable_runways, user_file
 from groundstation.base.runways.ourairports import read_ourairports

@@ -11,13 +11,14 @@ from collections.abc import Iterator, Mapping
 from io import StringIO
 from typing import Any
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.unit_names import UNITS
 
 _OF_PARAMETERS = re.compile(r"^ {4}(\w+(?:, \w+)*)(?: : [^\n]*)?\n((?: {8}[^\n]*\n?)+)", re.MULTILINE)
 FEWEST_WORDS = 4  # of a comment above a field that is about it, and no title of a group
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class Setting:
     """One setting.
 

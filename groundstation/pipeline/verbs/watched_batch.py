@@ -9,12 +9,13 @@ import os
 import signal
 import threading
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from multiprocessing.connection import Connection
 from multiprocessing.connection import wait as wait_for
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, UnclaimedLogError
 from groundstation.base.without_pandas import spare_pandas
 from groundstation.pipeline.one_flight.configuration import Configuration

@@ -7,9 +7,10 @@ what is finished, and goes on. Folders are listed again and again, which works o
 import math
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UsageError
 from groundstation.base.words import counted
 from groundstation.pipeline.many_flights.inputs import collect

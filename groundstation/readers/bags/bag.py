@@ -2,11 +2,12 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TypeAlias
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Damage
 from groundstation.readers.bags.marks import MCAP_MAGIC, METADATA, METADATA_BEGINS, ROS1_MAGIC, SQLITE_MAGIC

@@ -5,11 +5,11 @@ and forward-left-up.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.readers.bags.values import Values, attitude, body, level, rotated

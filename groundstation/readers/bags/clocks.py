@@ -6,11 +6,12 @@ with the log time, or where they go on smoothly while messages were logged in bu
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S

@@ -2,11 +2,12 @@
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import MAX_TEXT_CHARACTERS, Column, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.bags.definitions import DefinitionError, MessageDefinition, known, parse

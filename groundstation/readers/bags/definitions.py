@@ -7,11 +7,12 @@ Source: http://wiki.ros.org/msg (ROS 1); https://docs.ros.org/en/rolling/Concept
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
 
 import numpy as np
+
+from groundstation.base.dataclasses import dataclass
 
 MOST_FIELDS = 4_000  # fields of one definition with all its parts: a longer text is no definition
 _SEPARATOR = re.compile(r"^=+\s*$", re.MULTILINE)

@@ -9,11 +9,12 @@ Source: FlatBuffers, Internals, and reflection/reflection.fbs (Google, 2025); ht
 
 import struct
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from struct import Struct
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import MAX_TEXT_CHARACTERS
 from groundstation.readers.bags.definitions import MOST_FIELDS, DefinitionError
 

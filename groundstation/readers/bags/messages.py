@@ -3,12 +3,12 @@
 The messages are not decoded yet.
 """
 
-from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Damage, Int64Array
 
 ByteArray = NDArray[np.uint8]

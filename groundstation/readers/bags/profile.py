@@ -4,7 +4,6 @@ docs/bags.md describes every key; all other keys are those of the profiles of ta
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 from types import MappingProxyType
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.angles import wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column, Int64Array
 from groundstation.base.signals import is_canonical
 from groundstation.readers.bags.canonical import ACCEL, FIELD, POSITION, RATES, VELOCITY

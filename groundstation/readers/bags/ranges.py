@@ -6,11 +6,11 @@ stand, which ends are this log's own, and the names of the others.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Column
 from groundstation.readers.bags.values import Values
 from groundstation.readers.mapping import Columns

@@ -9,11 +9,12 @@ Source: http://wiki.ros.org/Bags/Format/2.0.
 import bz2
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import lz4.frame
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Damage
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.bags.definitions import plain_name

@@ -7,10 +7,11 @@ Source: http://wiki.ros.org/Bags/Format/2.0.
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import islice
 from typing import BinaryIO, NamedTuple
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.readers.bags.marks import ROS1_MAGIC
 
 MESSAGE, HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7

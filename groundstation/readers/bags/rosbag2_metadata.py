@@ -5,7 +5,9 @@ else of YAML is understood.
 """
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
+
+from groundstation.base.dataclasses import dataclass
 
 _FILES = re.compile(r"^\s*relative_file_paths:\s*\n((?:\s*-\s*.+\n?)+)", re.MULTILINE)
 _FILE = re.compile(r"^\s*-\s*(.+?)\s*$", re.MULTILINE)

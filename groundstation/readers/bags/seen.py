@@ -4,10 +4,11 @@ Columns of its first messages, its stamps and log times.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column, Int64Array
 from groundstation.readers.bags import px4
 from groundstation.readers.bags.clocks import Stamped

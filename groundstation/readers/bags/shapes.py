@@ -8,13 +8,13 @@ Source: OMG DDS-XTypes 1.3, 7.4.1 (CDR); http://wiki.ros.org/ROS/Technical%20Ove
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import MAX_TEXT_CHARACTERS, BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.bags.definitions import PRIMITIVES, TEXT, TIMES, WIDE_TEXT, MessageDefinition

@@ -7,11 +7,11 @@ nodes that publish on one topic at the same time are two, whatever the name of t
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 from groundstation.readers.bags.messages import Connection
 

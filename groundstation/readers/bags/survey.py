@@ -5,10 +5,11 @@ One of three clocks tells when values were true.
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column, Remark
 from groundstation.base.signals import field_of, kind_of
 from groundstation.readers.bags import px4

@@ -4,7 +4,7 @@ Chunks expand, and a message may be made to take long. Steps are some microsecon
 bags take less than a tenth of what is allowed.
 """
 
-from dataclasses import dataclass
+from groundstation.base.dataclasses import dataclass
 
 FREE_STEPS, STEPS_PER_BYTE = 1_000_000, 4
 FREE_MESSAGES, BYTES_PER_MESSAGE = 200_000, 2  # messages of any file, and what one more takes of it when compressed

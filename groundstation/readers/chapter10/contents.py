@@ -1,12 +1,13 @@
 """Contents of the buses: terminals and subaddresses, buses and labels, how often each."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array, Item, LogHeader, RecordBatch
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.chapter10 import scan

@@ -5,12 +5,13 @@ It works on the raw topics, of a recording or of its MCAP alike.
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.signals import kind_of, topics_of_kind
 from groundstation.base.words import counted

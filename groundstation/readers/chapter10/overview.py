@@ -4,11 +4,12 @@ Dates on the buses are read where the time packets lack the year.
 """
 
 from collections import Counter
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from datetime import date
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.readers.chapter10 import scan
 from groundstation.readers.chapter10.bus_words import TOPIC_429, TOPIC_1553
 from groundstation.readers.chapter10.kinds import ARINC_429, MIL_STD_1553, TIME, TMATS

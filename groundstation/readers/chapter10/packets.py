@@ -4,12 +4,12 @@ Bytes that belong to no packet, and damaged packets, are counted.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage, Int64Array
 from groundstation.readers.chapter10 import kinds, scan

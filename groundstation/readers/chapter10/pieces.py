@@ -1,11 +1,12 @@
 """Merge of consecutive words into samples, in the order of the log."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.nearest import nearest_rows
 from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
 from groundstation.readers.chapter10 import scan

@@ -4,11 +4,12 @@ It tells what the recording holds and lacks, and what TMATS says of it.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Damage, Int64Array, Remark
 from groundstation.base.words import counted
 from groundstation.readers.chapter10 import kinds, scan

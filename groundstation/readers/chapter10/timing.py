@@ -5,12 +5,12 @@ Where these have no year, it comes from elsewhere.
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from datetime import UTC, date, datetime, timedelta
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array, Remark, UtcReadings
 from groundstation.base.timescales import leap_seconds_at, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S

@@ -2,8 +2,10 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from datetime import date
+
+from groundstation.base.dataclasses import dataclass
 
 YEARS = range(1970, 2200)  # years of recordings; others are damage
 MOST_CHARACTERS = 4 << 20  # characters of all attributes; real ones have some 100 thousand

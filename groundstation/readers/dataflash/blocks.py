@@ -4,12 +4,12 @@ Bytes that belong to no record are counted.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage, Int64Array
 from groundstation.readers.dataflash import scan

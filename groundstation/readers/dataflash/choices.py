@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.ardupilot_codes import ESTIMATORS
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Int64Array, Remark
 from groundstation.readers import imu
 from groundstation.readers.dataflash import rules

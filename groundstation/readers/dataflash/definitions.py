@@ -7,12 +7,14 @@ Source: ArduPilot, libraries/AP_Logger/README.md ("Format Types", "Units", "Mult
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+
+from groundstation.base.dataclasses import dataclass
 
 HEADER_BYTES = 3
 FMT_ID = 128

@@ -4,12 +4,13 @@ The states are those that last until the next record of them.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import has_position
 from groundstation.base.records import BoolArray, Damage, Int64Array
 from groundstation.readers.dataflash.blocks import RecordBlock, Scanner

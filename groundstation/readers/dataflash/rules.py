@@ -4,12 +4,12 @@ A documented unit is used when the log does not say the unit.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from math import isclose
 from types import MappingProxyType
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Damage
 from groundstation.base.units import CONVERSIONS
 from groundstation.readers.dataflash.definitions import RecordDefinition, Units

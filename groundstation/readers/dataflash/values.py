@@ -4,13 +4,13 @@ Implied scales are applied, texts end at their first NUL, times are in nanosecon
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column, Int64Array
 from groundstation.readers.dataflash.definitions import FieldSpec, RecordDefinition
 

@@ -1,8 +1,8 @@
 """Guess of what a column of a table becomes, as a line of a draft."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_text import quoted
 
 

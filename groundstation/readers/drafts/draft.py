@@ -5,10 +5,11 @@ question mark in the draft.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.readers.drafts.column import ColumnGuess, columns_in_doubt
 from groundstation.readers.drafts.guesses import Guesses
 from groundstation.readers.drafts.sample import sample_of

@@ -1,11 +1,11 @@
 """Motion of a table's positions: it shows the unit of a speed, and a track."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.dataclasses import dataclass
 
 _M_PER_DEG = 111_195.0  # on a sphere: a unit shows at a hundredth
 _FEWEST = 20  # moving samples that show anything

@@ -2,8 +2,8 @@
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, near_names
 from groundstation.readers.drafts.sample import TableSample, sample_of
 from groundstation.readers.drafts.time_guess import TimeGuess

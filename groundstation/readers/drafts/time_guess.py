@@ -1,10 +1,9 @@
 """Guess of the time of the rows of a table, and what makes numbers a time."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.readers.drafts.sample import TableSample
 from groundstation.readers.drafts.words import meaning_of
 

@@ -5,12 +5,12 @@ them between two neighbouring samples. The samples as recorded stay in ``raw.<pa
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.signals import Field, field_of
 from groundstation.base.units import CONVERSIONS

@@ -11,7 +11,6 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 import h5py
@@ -19,6 +18,7 @@ import numpy as np
 from h5py import h5o, h5t
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S

@@ -7,10 +7,11 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import METRES_PER_DEG
 from groundstation.base.records import MAX_BATCH_ROWS, Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.signals import RAW_PREFIX

@@ -6,10 +6,12 @@ than its samples take. So each dataset is placed first: in one block, in its hea
 
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from h5py import h5d
+
+from groundstation.base.dataclasses import dataclass
 
 DEFLATE, SHUFFLE, FLETCHER32, LZF = 1, 2, 3, 32_000
 FILTERS = frozenset((DEFLATE, SHUFFLE, FLETCHER32, LZF))

@@ -1,9 +1,10 @@
 """Units of words and messages: two that feed the same signal are ``ins.1`` and ``ins.2``."""
 
 from collections.abc import Hashable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, TypeAlias
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.readers.icd.model import Element, Element429, Message1553, Word429
 
 Holder: TypeAlias = Word429 | Message1553

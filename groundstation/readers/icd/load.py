@@ -6,10 +6,11 @@ docs/chapter10.md describes them.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar, cast, get_args
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.signals import kind_of
 from groundstation.readers.icd.instances import numbered

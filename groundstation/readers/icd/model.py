@@ -1,11 +1,12 @@
 """ICD as values: the contents of each bus word, and the canonical signal of each element."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+
+from groundstation.base.dataclasses import dataclass
 
 FloatArray: TypeAlias = NDArray[np.float64]
 Status = Literal["bnr", "bcd", "discrete", "none"]

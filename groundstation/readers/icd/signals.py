@@ -4,13 +4,14 @@ The ICD states a signal (``signal``), or name and unit make it plain.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TypeVar
 
 import numpy as np
 
 from groundstation.base.angles import wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.signals import field_of, kind_of
 from groundstation.base.units import CONVERSIONS, factor_to
 from groundstation.readers.icd.model import Element, FloatArray, Transform

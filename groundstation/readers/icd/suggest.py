@@ -6,12 +6,13 @@ file has to check it.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import continuous_longitude_deg
 from groundstation.base.signals import kind_of
 from groundstation.readers.icd.dump import to_yaml

@@ -5,10 +5,11 @@ Nothing is constructed, nested deeply or repeated without bound.
 Scalars stay the text that was written. YAML 1.1 would read the key ``off`` as false and the label ``076`` as 62.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 
 Value: TypeAlias = "str | list[Value] | dict[str, Value] | None"

@@ -3,8 +3,9 @@
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Remark
 from groundstation.base.timescales import ROLLOVER_NS, iso_to_utc_ns, leap_seconds_at, utc_ns_to_iso
 from groundstation.base.words import counted

@@ -9,10 +9,10 @@ shape of many others. Its time is the time of arrival by the clock of that compu
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import islice
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.receiver.checksums import is_sentence
 

@@ -6,10 +6,11 @@ clock gives the date: its offset from the receiver's must be some quarters of an
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column, Int64Array, RecordBatch, Remark
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.receiver.host_text import DATE, DAY, HostText

@@ -8,13 +8,13 @@ field named first says, ``*`` to the end of the message. Behind another ``|`` st
 """
 
 import re
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column
 
 _TYPES = {"u": "<u", "i": "<i", "r": "<f", "c": "S", "x": "<u"}

@@ -4,13 +4,13 @@ Columns have the receiver's own names.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import (
     MAX_BATCH_ROWS,
     MAX_TEXT_CHARACTERS,

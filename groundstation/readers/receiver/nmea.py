@@ -5,10 +5,10 @@ without a fraction is the same as any within that second: some receivers cut the
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.receiver.sentence_layouts import TIME_FIELD, TIMED

@@ -10,11 +10,11 @@ novatel_edie (MIT).
 import re
 import struct
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 from groundstation.readers.receiver import scan
 from groundstation.readers.receiver.novatel_messages import LAYOUTS

@@ -2,10 +2,11 @@
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Damage, Int64Array, Remark
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S

@@ -1,13 +1,13 @@
 """Cut a receiver's stream into blocks of frames; bytes of no frame are counted."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage, Int64Array
 from groundstation.readers.receiver import scan

@@ -2,11 +2,12 @@
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import NO_POSITION
 from groundstation.base.records import AT_ODDS, HEADING_IS_TRACK, Damage, Int64Array, Item, RecordBatch, Remark
 from groundstation.base.words import counted

@@ -11,10 +11,11 @@ others are put on that of the others (:func:`on_one_date`), and so are the times
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.timescales import (
     GPS_EPOCH_NS,

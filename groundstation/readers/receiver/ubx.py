@@ -2,12 +2,13 @@
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.timescales import MOST_LEAP_S
 from groundstation.base.units import NS_PER_S

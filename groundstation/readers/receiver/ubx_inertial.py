@@ -13,11 +13,11 @@ Navigation, gnss_converters (MIT), ubx_sbp.c: msss, and the counter's step of 39
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column, Int64Array, RecordBatch
 from groundstation.readers import imu
 from groundstation.readers.receiver.messages import MessagesByName

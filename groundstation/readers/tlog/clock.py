@@ -7,12 +7,13 @@ sent before and behind it.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cache
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.clock_offsets import ClockJump, Offsets, offsets_by

@@ -5,13 +5,13 @@
 Only its tables of fields are used; frames are found and read by our own code.
 """
 
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UnreadableLogError
 
 MOST_IDS = 1 << 16

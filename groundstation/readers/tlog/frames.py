@@ -1,7 +1,6 @@
 """Frames of a stretch of a telemetry log: senders, times of receipt, field values."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
 from operator import itemgetter
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column, Int64Array
 from groundstation.readers.tlog.dialect import DialectMessage
 

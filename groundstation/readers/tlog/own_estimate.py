@@ -7,10 +7,11 @@ Source: ArduPilot, EKF_STATUS_REPORT of ardupilotmega.xml (EKF_UNINITIALIZED), G
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column, Int64Array, Remark
 from groundstation.readers.parts import TopicPart
 from groundstation.readers.tlog.canonical import OF_FILTER

@@ -5,11 +5,12 @@ Each message comes raw, and canonical where a rule serves it.
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import NO_POSITION
 from groundstation.base.log_levels import severity_of_level
 from groundstation.base.records import Column, Damage, Int64Array, Item, LogHeader, Remark

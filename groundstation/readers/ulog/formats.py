@@ -2,12 +2,12 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 
 DTYPES: Mapping[str, str] = {

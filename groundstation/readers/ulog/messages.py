@@ -1,8 +1,8 @@
 """Messages other than data, parsed from their bytes."""
 
 import struct
-from dataclasses import dataclass
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.readers.ulog.formats import DTYPES
 

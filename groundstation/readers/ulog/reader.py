@@ -6,13 +6,14 @@ Each topic comes raw, and canonical where a rule serves it.
 import re
 from collections import Counter, deque
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.atmosphere import REFUSED
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import (
     Column,
     Damage,

@@ -1,11 +1,12 @@
 """Topics of the messages that are not data: text, parameters, information, drop-outs."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Column, Damage, Int64Array, RecordBatch
 from groundstation.readers.ulog.blocks import UlogBlock

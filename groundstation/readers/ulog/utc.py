@@ -1,10 +1,11 @@
 """UTC of power-up: by the receivers of a log, else by the autopilot's own clock."""
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Int64Array, Remark
 from groundstation.base.timescales import GPS_EPOCH_NS, iso_to_utc_ns, utc_ns_to_iso

@@ -4,11 +4,12 @@ Room for the texts around them, columns that agree, windows; in points.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.plots import extents
 from groundstation.plots.marks import Cells, Floats
 from groundstation.plots.plot import WIDTH_MM, Panel, Plot, Row

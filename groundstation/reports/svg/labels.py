@@ -1,10 +1,10 @@
 """Places of labels beside points, within outlines, at lines; no label covers another."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.plots.marks import Limit, Outlines, Points
 from groundstation.reports.svg.boxes import EDGE_PT, Box
 from groundstation.reports.svg.colours import COLOURS, FAINT

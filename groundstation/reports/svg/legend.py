@@ -4,8 +4,8 @@ It stands in lines above the panel or in a column beside it.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.plots.marks import (
     AnyMark,
     Band,

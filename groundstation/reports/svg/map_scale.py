@@ -1,10 +1,10 @@
 """Scale bar of a map and its arrow to the north, in the corner that the track leaves free."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.chapters.wording import NARROW_SPACE
 from groundstation.plots.marks import Curve, Floats, Points
 from groundstation.reports.svg.boxes import Box

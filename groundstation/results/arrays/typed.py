@@ -6,7 +6,7 @@ So the type checker finds a renamed column.
 import re
 import typing
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from functools import cache
 from types import MappingProxyType
 from typing import Any, ClassVar, Self, TypeAlias, TypeVar, cast, dataclass_transform
@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Self, TypeAlias, TypeVar, cast, dataclass_tran
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import frozen
 from groundstation.results.figures import FigureData

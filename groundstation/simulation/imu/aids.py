@@ -1,11 +1,12 @@
 """Sensors beside an inertial unit and GNSS: barometer, wheels, magnetometer."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.atmosphere import SEA_LEVEL_K, SEA_LEVEL_PA
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.declination import declination_along
 from groundstation.base.records import frozen
 from groundstation.simulation.imu.motion import Motion, TrueStates, true_states

@@ -1,11 +1,11 @@
 """Families of motion: car, fixed wing, multicopter, and a log that begins in flight."""
 
-from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.simulation.imu.jets import Jet, Ramps, Sines, cosine, direction, root, sine
 from groundstation.simulation.imu.motion import ORDER, Motion, MotionJets, Origin, Place

@@ -1,10 +1,11 @@
 """Simulated flight of an inertial unit with GNSS: its log, and the truth behind it."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.simulation.imu.aids import SimulatedAids, sense

@@ -2,10 +2,11 @@
 
 They ship as TOML beside this module, one file a class."""
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cache
 from typing import Any
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.toml_settings import number, required_number, settings_from
 from groundstation.simulation.ins_class import load_ins_class

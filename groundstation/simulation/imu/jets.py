@@ -1,12 +1,13 @@
 """Jets: values of functions of time with their exact derivatives, by Taylor coefficients."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import factorial, sqrt
 from typing import Union
 
 import numpy as np
 from numpy.typing import NDArray
+
+from groundstation.base.dataclasses import dataclass
 
 FloatArray = NDArray[np.float64]
 Term = Union["Jet", FloatArray, float]

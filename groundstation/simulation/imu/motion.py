@@ -2,7 +2,7 @@
 
 The integrals are those of angular rate and of specific force."""
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Protocol
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_360
 from groundstation.base.attitude import rotation_n_from_b
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import EARTH_RATE_RADPS, ECCENTRICITY_SQUARED, SEMI_MAJOR_M, curvature_radii_m
 from groundstation.base.gravity import normal_gravity_mps2
 from groundstation.base.records import frozen

@@ -1,11 +1,12 @@
 """GNSS receiver beside an inertial unit: coloured errors, lever arm, latency."""
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import curvature_radii_m
 from groundstation.base.records import BoolArray, frozen
 from groundstation.simulation.imu.motion import Motion, true_states

@@ -6,11 +6,11 @@ Source: http://wiki.ros.org/Bags/Format/2.0; definitions of common_msgs 1.12.
 """
 
 import struct
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.simulation.imu.flight import ImuFlight

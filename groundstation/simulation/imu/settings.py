@@ -1,8 +1,9 @@
 """Settings of a simulated log of an inertial unit with GNSS."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_settings import check_ranges, number
 from groundstation.simulation.scenario import ZERO, LogInterval, Vector
 

@@ -1,11 +1,10 @@
 """Inertial unit: what it measures, and the stamps of its log."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.attitude import rotation_n_from_b
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray
 from groundstation.base.units import MPS2_PER_G
 from groundstation.simulation.imu.imu_class import ImuClass

@@ -4,13 +4,14 @@ It is written down in docs/evidence/units.md.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Literal, TypeAlias, get_args
 from zlib import crc32
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.simulation.inertial_family import ORDINARY_RECEIVER
 from groundstation.simulation.ins_units.settings import (
     AnyUnitFault,

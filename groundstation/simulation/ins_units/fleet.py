@@ -1,9 +1,9 @@
 """Logs of a fleet over months: aircraft whose INS age, are moved and are replaced."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.timescales import iso_to_utc_ns, utc_ns_to_iso

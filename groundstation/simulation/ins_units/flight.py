@@ -1,12 +1,13 @@
 """Flights with several INS units: one true motion, errors of each unit, one receiver."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from zlib import crc32
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import displaced_deg
 from groundstation.base.records import frozen
 from groundstation.simulation.inertial_family import draw_gnss_errors

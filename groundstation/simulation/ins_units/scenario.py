@@ -1,9 +1,10 @@
 """Scenarios of flights with several units: shipped ones and the user's, as TOML."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.timescales import iso_to_utc_ns

@@ -1,8 +1,9 @@
 """Settings of a flight with several INS units: what they share, how they write, faults."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar, Literal, TypeAlias
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import check_ranges, number, required_number
 from groundstation.simulation.inertial_family import ORDINARY_RECEIVER, GnssErrorModel

@@ -1,12 +1,13 @@
 """Faults of one unit: those of its errors, and those of what it writes."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 from groundstation.simulation.ins_class import InsClass
 from groundstation.simulation.ins_draw import Streams, draw_sensor_errors

@@ -4,12 +4,12 @@ Its motion stands in aircraft_motion.py.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import EARTH_RATE_RADPS, curvature_radii_m
 from groundstation.systems.cooperative.aircraft_motion import AircraftMotion, places
 from groundstation.systems.cooperative.loop_types import (

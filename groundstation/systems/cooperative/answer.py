@@ -3,9 +3,10 @@
 The ranges are between vehicles.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.answer import SessionAnswer
 from groundstation.results.figures import FigureData
 from groundstation.systems.cooperative.stations_answer import StationsAnswer

@@ -1,10 +1,9 @@
 """Consistency: errors against the sigmas that a filter claims, and divergence."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray
 from groundstation.systems.cooperative.tracks import VehicleTrack
 from groundstation.tables.session import DeadReckoning, Odometry

@@ -1,11 +1,12 @@
 """All algorithms on one session, judged where truth is known: the cooperative answer."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.findings import Finding
 from groundstation.methods.intervals import nees_limits
 from groundstation.systems.cooperative import figures

@@ -1,11 +1,12 @@
 """A session as events in order of time, with what could not be used counted."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.ecef import ecef_from_n, geodetic_deg_m
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding

@@ -14,11 +14,12 @@ Schubert, Roumeliotis and Burgard, International Journal of Robotics Research 37
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.findings import Finding
 from groundstation.base.records import frozen
 from groundstation.base.words import counted

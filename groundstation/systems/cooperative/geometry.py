@@ -10,11 +10,12 @@ Posterior Cramer-Rao bounds for discrete-time nonlinear filtering, 1998 (for a G
 true tracks the bound is the covariance of the Kalman filter linearised there).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 from groundstation.systems.cooperative.algorithms import run_algorithm
 from groundstation.systems.cooperative.events import prepare

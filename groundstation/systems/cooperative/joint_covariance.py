@@ -8,12 +8,12 @@ Source: Gelb (editor), Applied optimal estimation, 1974, section 7.2.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import accumulate, pairwise
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.filters.observation import LinearisedMeasurement, rows_of

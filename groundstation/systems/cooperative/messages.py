@@ -5,11 +5,11 @@ Little-endian; positions and covariances of full vectors as 8-byte numbers, the 
 """
 
 import struct
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 
 HEADER = struct.Struct("<BBIf")  # sender, rank, slot, seconds since the start of the slot's frame: 10 bytes
 PLACE = struct.Struct("<4d")  # position and clock

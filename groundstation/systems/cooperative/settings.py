@@ -1,8 +1,9 @@
 """Settings of the cooperative filters: assumed errors of INS, odometry, clocks; updates."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_settings import check_ranges, number
 
 Update = Literal["sequential", "simultaneous"]

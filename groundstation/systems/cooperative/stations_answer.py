@@ -1,7 +1,8 @@
 """Answer about the ground stations of a session: rows of the cooperative answer."""
 
-from dataclasses import dataclass
 from typing import Literal
+
+from groundstation.base.dataclasses import dataclass
 
 StationVerdict = Literal["fits", "off", "one of several", "left out", "not judged"]
 

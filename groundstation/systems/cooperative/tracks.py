@@ -1,11 +1,12 @@
 """Results of a run: every vehicle's states at the times of output, and counts."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array, frozen
 
 

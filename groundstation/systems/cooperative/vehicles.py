@@ -5,10 +5,10 @@ estimated error (aircraft.py). A wheeled vehicle's state is its place and headin
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Protocol
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 
 SAME_TIME_S = 1e-9
 PATIENCE = 30  # rejections of a vehicle in a row: then its clock has leapt, or it is not where it thinks

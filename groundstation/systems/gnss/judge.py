@@ -1,9 +1,10 @@
 """Grade of the reception, its reasons, and the findings."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.words import counted
 from groundstation.systems.gnss.answer import (

@@ -1,6 +1,6 @@
 """Rows of one receiver as arrays: places, velocities, states, time each row stands for."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.gaps import logged_ns
 from groundstation.base.geodesy import SEMI_MAJOR_M, curvature_radii_m, on_earth
 from groundstation.base.nearest import nearest_rows

@@ -1,7 +1,6 @@
 """Settings of the GNSS reception. Every limit of the method stands here."""
 
-from dataclasses import dataclass
-
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_settings import check_ranges, number
 
 

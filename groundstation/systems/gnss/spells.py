@@ -1,12 +1,12 @@
 """Spells of the states of a receiver, shares of its time in them, and losses of the fix."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.systems.gnss.answer import (
     NOT_LOGGED,
     STATE_NAMES,

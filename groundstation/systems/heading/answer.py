@@ -5,12 +5,13 @@ The basis is the reason for it, and its interval.
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar, Literal
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray
 from groundstation.results.answer import Answer
 from groundstation.results.arrays.typed import found_in

@@ -9,12 +9,11 @@ the offset being the age of the GNSS velocity at its time stamp. At one speed ar
 apart: the prior of the offset bounds what the arm may be.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.methods.taxi.gating import NOT_TAXI
 from groundstation.methods.taxi.samples import TaxiSamples

@@ -1,11 +1,10 @@
 """Checks of the differences: how large beside what GNSS and sway explain, how steady."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import unwrap
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95, chi_square_quantile
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.methods.intervals import effective_samples

@@ -4,9 +4,9 @@ A new gate is a row here, its value in :mod:`verdict` (with what it is judged by
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.gates import Bound
 
 NextLine = Literal["Fly", "Record", "Check"]

@@ -1,11 +1,11 @@
 """Normality of the differences: sizes of the deviation, gated, and p-values, shown."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import two_sided_p
 from groundstation.systems.heading.settings import HeadingSettings
 

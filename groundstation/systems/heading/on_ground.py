@@ -3,8 +3,9 @@
 The limits of speed may differ from those of taxi.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.methods.roles import HeadingOnGround
 from groundstation.results.roles import Delays
 from groundstation.systems.heading.answer import HeadingResult

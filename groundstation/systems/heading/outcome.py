@@ -1,10 +1,11 @@
 """The answer: gates, verdict and references around a solution, as the frozen result."""
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 
 import numpy as np
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.methods.taxi_error.posterior import ErrorPosterior
 from groundstation.results.figures import FigureData

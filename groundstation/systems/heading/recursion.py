@@ -1,10 +1,9 @@
 """Running figures of the paper after every sample: mean, variance, precision e, quality."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 
 FloatArray = NDArray[np.float64]

@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import mean_heading, unwrap, wrap_180, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.methods.ins_noise import class_names, load_class

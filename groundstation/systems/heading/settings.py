@@ -3,9 +3,10 @@
 Constants of the method stand beside their use.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import check_ranges, number
 from groundstation.methods.taxi.settings import RateKind

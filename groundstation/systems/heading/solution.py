@@ -3,12 +3,13 @@
 It starts from gated samples.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import mean_heading, wrap_180, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray
 from groundstation.methods.taxi.samples import TaxiSamples, take_samples, without_arm
 from groundstation.methods.taxi_error.interval import (

@@ -1,11 +1,12 @@
 """Stage A: the GNSS velocity assessed while the aircraft stands."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import unwrap
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import length_quantile
 from groundstation.base.records import BoolArray
 from groundstation.methods.intervals import effective_samples

@@ -10,11 +10,11 @@ takes the other sign. Mounting, and sideslip that is the same in every direction
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.metar import metar_winds, nearest_wind
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S

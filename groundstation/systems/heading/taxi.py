@@ -1,9 +1,8 @@
 """Straight taxi of a flight: the epochs that the heading is estimated from."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.words import counted
 from groundstation.methods.taxi.delay import KnownDelay, known_delay

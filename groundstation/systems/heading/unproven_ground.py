@@ -3,11 +3,10 @@
 A vehicle that is found to roll was on the ground at them too: what they say against the answer is heard.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.methods.taxi.gating import NOT_PROVEN, is_straight_and_fast
 from groundstation.methods.taxi.samples import TaxiSamples

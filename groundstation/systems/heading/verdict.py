@@ -1,10 +1,11 @@
 """Gates with figure and limit, the verdict that follows from them, and the number to type."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.base.words import counted

@@ -1,10 +1,11 @@
 """Answer of autopilot health: verdict of each check and of the flight."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, ClassVar, Literal
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.words import clock_text, tenths_text
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData

@@ -1,8 +1,8 @@
 """Autopilots whose logs are known, each with the source of its evidence."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.systems.health import ardupilot, mavlink, px4
 from groundstation.systems.health.evidence import Event, Evidence
 from groundstation.tables.table import Flight

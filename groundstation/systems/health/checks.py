@@ -5,10 +5,11 @@ Shares of time in the air, worst span, and the threshold behind it.
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.health.answer import FIRST, LOGGED_BLANK, Check, Measure, Verdict

@@ -1,11 +1,11 @@
 """Evidence of an autopilot's health: quantities, events, and when it flew."""
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array, frozen
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.health.answer import WHOLE_LOG

@@ -10,10 +10,10 @@ of 3.3 (THR_MIN, MOT_THST_MAX); PX4, mixer_module (PWM_MAIN_FUNCn), THR_MDL_FAC.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.health.answer import AttitudeLoss, MotorOutput

@@ -4,11 +4,11 @@ What is set comes from the log alone, and so do defaults: a parameter whose defa
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.declination import declination_along
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import topics_of_kind

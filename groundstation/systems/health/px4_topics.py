@@ -4,11 +4,11 @@ Columns may be missing, estimators several, and counters wrap.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.systems.health.evidence import Evidence, FloatArray
 from groundstation.tables.table import Flight, Table

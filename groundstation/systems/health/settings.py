@@ -1,8 +1,9 @@
 """Settings of autopilot health: what differs from thresholds.toml."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_settings import check_ranges, number
 from groundstation.systems.health.limits import Limit, thresholds
 

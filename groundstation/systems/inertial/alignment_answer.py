@@ -1,8 +1,9 @@
 """Answer on the INS on the ground: alignment, stand, shutdown, alignments between."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar, Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.systems.inertial.units_answer import Measured

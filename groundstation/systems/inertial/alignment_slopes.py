@@ -1,10 +1,9 @@
 """Means and slopes of a velocity with intervals that know its rounding and its slow noise."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import student_quantile
 from groundstation.methods.intervals import BOUND95
 from groundstation.systems.inertial.units_answer import Measured

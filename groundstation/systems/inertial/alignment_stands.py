@@ -1,10 +1,11 @@
 """Stands of the aircraft by GNSS, by the INS alone where there is none."""
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import on_earth
 from groundstation.base.records import BoolArray, frozen
 from groundstation.systems.inertial.differences import POSITION_FIELDS, VELOCITY_FIELDS, mean_in

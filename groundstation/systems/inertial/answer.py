@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.answer import Answer
 from groundstation.results.corrected_position import BestTrack, CorrectedPosition, MadeTrack
 from groundstation.results.figures import FigureData

@@ -1,10 +1,10 @@
 """Arrays of the inertial analysis; errors are INS minus truth, times flight seconds."""
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.arrays.typed import Arrays, Flags, Floats, Part, column
 
 _TIME = {"time_s": 2}

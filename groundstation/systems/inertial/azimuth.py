@@ -4,10 +4,11 @@ An INS whose north is turned by a heading error psi (INS - truth, clockwise posi
 psi: change of velocity error = psi x (-change east, +change north). Straight flight shows nothing of it.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.base.quantiles import student_quantile
 from groundstation.base.records import BoolArray

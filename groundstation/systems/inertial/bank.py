@@ -9,11 +9,12 @@ Source: D. T. Magill, Optimal adaptive estimation of sampled stochastic processe
 that predicts the next second best is not the one that forecasts the next hour best.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 from groundstation.systems.inertial.coarse import Coarse
 from groundstation.systems.inertial.filter import ChannelsRun, Initial, initial_of, run_filter

@@ -1,8 +1,9 @@
 """Answer on the causes of the errors of an unaided INS: shares, Schuler, body, legs."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar, Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.systems.inertial.units_answer import Measured

@@ -9,11 +9,12 @@ Source: Rosenberg, Random coefficients models, Annals of Economic and Social Mea
 Kalman filter, Annals of Statistics 19, 1991, equations 3.1 to 3.3 (here the constants have a prior).
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Int64Array, frozen
 from groundstation.methods.ins_noise import RADPS_PER_DPH, InsNoise

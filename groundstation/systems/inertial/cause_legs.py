@@ -1,10 +1,9 @@
 """Straight legs of a flight from its track, and errors along and across it."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import BoolArray
 from groundstation.base.units import M_PER_NAUTICAL_MILE

@@ -1,10 +1,9 @@
 """Schuler oscillation of a velocity error by plain least squares over a flight."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.systems.inertial.cause_answer import Within95
 from groundstation.systems.inertial.cause_legs import RECEIVER

@@ -3,11 +3,10 @@
 The sigma is widened through outages at whose end GNSS is beyond the gate.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.methods.kalman import filter as kalman
 from groundstation.methods.kalman.arrays import NO_STEP, REJECTED, USED, Drive, MeasurementRows

@@ -1,9 +1,10 @@
 """Coarse epochs: means over some seconds, for filtering the same flight many times."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 from groundstation.methods.ins_noise import InsNoise
 from groundstation.methods.kalman.arrays import USED

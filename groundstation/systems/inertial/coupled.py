@@ -8,12 +8,12 @@ Signs: error = INS - truth. With the phi-angle (computed attitude = (I - [phi x]
 the east tilt +phi_N - positive where the velocity error falls - and the heading error -phi_D.
 """
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.base.records import Int64Array, frozen
 from groundstation.base.units import MPS2_PER_G

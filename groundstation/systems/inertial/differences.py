@@ -1,11 +1,12 @@
 """Differences INS minus GNSS for the filter, with what could not be believed left out."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 
 import numpy as np
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.base.geodesy import curvature_radii_m, on_earth

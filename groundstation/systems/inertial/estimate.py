@@ -1,11 +1,12 @@
 """Estimator of INS errors: from flight tables to states, their basis, and corrected track."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.findings import Finding
 from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.signals import topics_of_kind

@@ -1,12 +1,13 @@
 """Kalman filter and smoother of both channels, on irregular epochs and across gaps."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.methods.ins_noise import InsNoise
 from groundstation.methods.kalman import filter as kalman

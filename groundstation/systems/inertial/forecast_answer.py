@@ -3,11 +3,12 @@
 The forecast is replayed on the flight itself.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.answer import Answer
 from groundstation.results.arrays.typed import found_in
 from groundstation.results.figures import FigureData

@@ -4,10 +4,10 @@ The forecast starts from the near side, the smoother uses both.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.systems.inertial.coarse import Coarse
 from groundstation.systems.inertial.filter import ChannelsRun, DifferenceEpochs, Initial, run_filter, smooth

@@ -1,10 +1,11 @@
 """Forecast replayed from many moments of a flight, against what GNSS showed later."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 from groundstation.systems.inertial.bank import NoiseBank, run_bank
 from groundstation.systems.inertial.filter import ChannelsRun

@@ -1,7 +1,6 @@
 """Errors of an INS that GNSS corrects, as an answer with states of its own knows them."""
 
-from dataclasses import dataclass
-
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.words import listed, places_of, span_text, with_half
 from groundstation.results.answer import Answers, answer_meeting
 from groundstation.results.roles import ErrorsOfFilter, FilterError, FilterWrong

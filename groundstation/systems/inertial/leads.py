@@ -3,10 +3,9 @@
 The build-up is that shown by GNSS and that of states carried along by a model.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 from groundstation.methods.kalman.arrays import Drive
 from groundstation.methods.kalman.filter import forecast

@@ -1,9 +1,8 @@
 """Alignments that the logged mode of an INS shows, without the flicker of its flag."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.systems.inertial.differences import UNUSED_MODES
 from groundstation.tables.motion import runs
 from groundstation.tables.table import Flight

@@ -5,13 +5,13 @@ noise depends on which way is north.
 """
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import SEMI_MAJOR_M, curvature_radii_m
 from groundstation.base.records import frozen
 

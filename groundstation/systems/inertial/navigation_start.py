@@ -3,11 +3,10 @@
 Without it no error rate can be stated.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.findings import Finding
 from groundstation.base.timescales import iso_to_utc_ns

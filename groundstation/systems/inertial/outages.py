@@ -3,11 +3,12 @@
 It is told how the forecast came out.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.inertial.answer import RealOutage
 from groundstation.systems.inertial.coupled import CoupledRun, run_coupled

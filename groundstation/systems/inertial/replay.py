@@ -1,9 +1,8 @@
 """Plan of replayed outages: starts, horizons, and whether the log allows a calibration."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 from groundstation.results.forecast_methods import FORECAST_HORIZONS_MIN
 from groundstation.systems.inertial.filter import ChannelsRun

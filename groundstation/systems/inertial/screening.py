@@ -1,12 +1,12 @@
 """Screening of INS and GNSS: frozen or jumping receivers, INS resets, missing numbers."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.findings import Finding
 from groundstation.base.geodesy import SEMI_MAJOR_M
 from groundstation.base.records import BoolArray, Int64Array

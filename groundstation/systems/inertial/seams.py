@@ -10,10 +10,9 @@ more than a factor of :data:`FACTOR_MAX` together. Fixes further off wait for :d
 them.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.systems.inertial.model import FloatArray
 

@@ -1,8 +1,8 @@
 """Settings of the INS error estimator and of the forecast, with every limit of the method."""
 
-from dataclasses import dataclass
 from typing import Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import number
 from groundstation.results.forecast_methods import FORECAST_METHODS

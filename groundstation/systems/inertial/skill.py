@@ -4,10 +4,10 @@ They are over starts.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.records import BoolArray
 from groundstation.methods.ins_noise import ScaleName

@@ -7,11 +7,11 @@ for s <= t, where Pi is the covariance of the true state without any data. d hol
 oscillation, which P alone knows nothing of.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array, frozen
 from groundstation.methods.kalman.smoother import lag_covariances
 from groundstation.systems.inertial.filter import ChannelsRun

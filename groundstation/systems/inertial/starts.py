@@ -1,9 +1,8 @@
 """Start of a forecast: each method's state when GNSS is lost, from nothing later."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 from groundstation.methods.kalman.smoother import smooth_lags
 from groundstation.systems.inertial.filter import ChannelsRun

@@ -1,10 +1,10 @@
 """Transitions and process noise between epochs, and what is added where outages failed."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 from groundstation.methods.ins_noise import InsNoise
 from groundstation.methods.kalman.transition import distinct_steps

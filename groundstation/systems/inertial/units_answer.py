@@ -1,8 +1,9 @@
 """Answer on several INS of one flight: each against GNSS, in pairs, and which one is off."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar, Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 

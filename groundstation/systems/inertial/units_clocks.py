@@ -1,10 +1,9 @@
 """Clocks of several units against each other, and units that repeat another."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import student_quantile
 from groundstation.base.records import BoolArray
 from groundstation.systems.inertial.units_answer import Measured

@@ -1,12 +1,12 @@
 """Growth of each unit and each pair beside the limits of honest units."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray
 from groundstation.systems.inertial.units_answer import Measured
 from groundstation.systems.inertial.units_grid import OnGrid, apart_m, heading_apart_deg

@@ -1,12 +1,12 @@
 """Faults that a unit shows in its own output: swapped axes, stuck or frozen values, steps."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import BoolArray
 from groundstation.systems.inertial.units_answer import Measured

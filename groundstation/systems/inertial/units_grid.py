@@ -1,11 +1,12 @@
 """Several tracks on one grid of times, and the difference of two of them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import curvature_radii_m, on_earth
 from groundstation.base.records import BoolArray
 from groundstation.systems.inertial.units_track import ReferenceTrack, UnitTrack

@@ -1,10 +1,9 @@
 """Growth of a difference between two tracks: rate, velocity, Schuler amplitude."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import M_PER_NAUTICAL_MILE
 from groundstation.methods.intervals import slope_through_origin

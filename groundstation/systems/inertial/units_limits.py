@@ -4,13 +4,13 @@
 ``python -m groundstation.systems.inertial.study.units_limits``.
 """
 
-from dataclasses import dataclass
 from functools import cache
-from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_text import toml_table
 
 FILE = "units_limits.toml"
@@ -40,7 +40,7 @@ class ClassLimits:
 
 @cache
 def _table() -> dict[str, Any]:
-    text = (resources.files("groundstation.systems.inertial") / FILE).read_text(encoding="utf-8")
+    text = Path(__file__).with_name(FILE).read_text(encoding="utf-8")
     return toml_table(text, FILE, "limits of honest units")
 
 

@@ -4,11 +4,12 @@ Copies are found, clocks brought together, axes put right, held outputs and step
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray
 from groundstation.systems.inertial.units_answer import Measured
 from groundstation.systems.inertial.units_clocks import ClockFit, clock_fit, repeats

@@ -1,10 +1,11 @@
 """Tracks of several INS and of the reference, as the comparison of units takes them."""
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 from groundstation.tables.sources import UNKNOWN
 

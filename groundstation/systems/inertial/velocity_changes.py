@@ -1,9 +1,10 @@
 """Changes of velocity of a flight, and what each azimuth parameter does to their errors."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.toml_settings import check_ranges, number
 from groundstation.systems.inertial.differences import InsDifferences

@@ -8,10 +8,11 @@ families each break one assumption.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.base.runways.table import END_SIGMA_M, SHIFT_SIGMA_M, THRESHOLD_SIGMA_M, RunwayTable
@@ -165,7 +166,7 @@ def measured_along(scenario: ApproachScenario, listed: RunwayTable) -> tuple[App
     """Return an approach and the error along its course; None where it is not measured."""
     flight = simulate_approach(scenario).flight
     try:
-        answer = LANDING.run(flight, Known(flight_phases(flight), runways=listed), ASSUMED).answer
+        answer = LANDING.run(flight, Known(flight_phases(flight), find_runways=lambda: (listed, "")), ASSUMED).answer
     except NotAssessableError:
         return None
     found = [(one, error) for one in answer.approaches for error in one.along_errors if error.state == "measured"]

@@ -1,12 +1,12 @@
 """Recorded approaches as an analysis: every final of a flight against its runway."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.geodesy import METRES_PER_DEG
 from groundstation.base.signals import topics_of_kind

@@ -1,10 +1,11 @@
 """Approaches of a recorded flight: path against the runway's, touchdown, accuracy."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from typing import ClassVar, Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.frames import Brief

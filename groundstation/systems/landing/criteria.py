@@ -1,11 +1,11 @@
 """Criteria of wind, threshold, flare, touchdown and roll-out of one approach."""
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import M_PER_FOOT
 from groundstation.results.gates import Gate

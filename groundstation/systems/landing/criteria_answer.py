@@ -1,9 +1,10 @@
 """Criteria of approaches and landings: what each bounds, its source, and what was found."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import ClassVar, Literal, NamedTuple
+
+from groundstation.base.dataclasses import dataclass
 
 CriterionState = Literal["met", "not met", "undecided", "no limit", "not measured", "not logged"]
 Group = Literal["approach", "threshold", "landing"]

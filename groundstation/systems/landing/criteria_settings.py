@@ -1,8 +1,9 @@
 """Limits and weights of the criteria of approaches: the table ``[landing.criteria]``."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import check_ranges, number
 from groundstation.base.units import M_PER_FOOT, MPS_PER_KNOT

@@ -1,7 +1,8 @@
 """Events of an approach in order of time: where it began, lost its limits, met the ground."""
 
-from dataclasses import dataclass
 from typing import Literal
+
+from groundstation.base.dataclasses import dataclass
 
 EventKind = Literal[
     "start",

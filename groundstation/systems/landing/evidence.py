@@ -4,12 +4,13 @@ Every witness is a likelihood over a grid of times, with a floor because any of 
 the time and its sigma; a witness whose own likelihood excludes that time disagrees.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.landing_categories import LINEAR_95
 from groundstation.systems.landing.ground import Ground, Heights, ground_of, heights_of
 from groundstation.systems.landing.height_witness import by_height

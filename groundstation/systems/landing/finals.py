@@ -1,11 +1,11 @@
 """Search for the finals of a flight: straight to a touchdown, or down and up on guidance."""
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, direction_of, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import METRES_PER_DEG, north_east_m
 from groundstation.base.runways.table import RunwayTable
 from groundstation.systems.known import Runway, SiteData

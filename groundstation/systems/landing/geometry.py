@@ -4,11 +4,12 @@ Distances are along the runway, positive before the threshold; across, right of 
 deviations are aircraft minus glide path.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, direction_of
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import SEMI_MAJOR_M, latitude_longitude_deg, north_east_m
 from groundstation.base.records import BoolArray
 from groundstation.base.runways.table import RunwayDirection

@@ -5,12 +5,12 @@ sigma.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.signals import topics_of_kind
 from groundstation.systems.landing.witnesses import rate_of
 from groundstation.tables.lift_off import SLOPE_SIGMA

@@ -1,11 +1,11 @@
 """Channels of configuration, thrust, wind, attitude and height about an approach."""
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.systems.landing.criteria_answer import REVERSED
 from groundstation.systems.landing.path import FlightPath
 from groundstation.tables.resample import join, values_at

@@ -1,11 +1,11 @@
 """Channels of a flight that matter to its approaches, on the times of one position source."""
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.geodesy import north_east_m
 from groundstation.base.records import Int64Array

@@ -11,13 +11,14 @@ distance between antennas, filters of the receiver (a final is flown slowly acro
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import MEAN_RADIUS_M, continuous_longitude_deg
 from groundstation.base.records import BoolArray
 from groundstation.base.units import M_PER_NAUTICAL_MILE, S_PER_H

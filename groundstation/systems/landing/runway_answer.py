@@ -1,8 +1,8 @@
 """Runway that an approach is measured against, and how it was chosen from the table."""
 
-from dataclasses import dataclass
 from typing import Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.frames import Brief
 
 PlacedBy = Literal["site file", "runway table", "positions"]

@@ -7,11 +7,11 @@ does not have, which lies anywhere near.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import METRES_PER_DEG, north_east_m
 from groundstation.base.runways.table import RunwayDirection, RunwayTable
 from groundstation.systems.landing.path import FlightPath, step_of

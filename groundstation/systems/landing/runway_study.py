@@ -9,10 +9,10 @@ families each break one assumption.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.base.runways.kept import shipped_runways
 from groundstation.base.runways.table import RunwayDirection, RunwayTable

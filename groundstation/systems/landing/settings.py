@@ -4,9 +4,10 @@ FSF: Flight Safety Foundation, ALAR Briefing Note 7.1, Stabilized Approach (2000
 Notes, Flying Stabilized Approaches (2006). ICAO: Annex 10, volume I, 3.1.3 and 3.1.5.
 """
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from typing import Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_settings import check_ranges, number
 from groundstation.base.units import M_PER_FOOT, MPS_PER_KNOT
 from groundstation.systems.landing.criteria_settings import CriteriaSettings

@@ -1,10 +1,9 @@
 """Sink rate onto the runway over the last second before a touchdown, with its sigma."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.systems.landing.evidence import Evidence
 from groundstation.systems.landing.ground import LATE_S, SPEED_NOISE_MPS, UNEVEN, Ground, Heights
 from groundstation.systems.landing.touchdown_answer import SINK_S

@@ -1,10 +1,9 @@
 """Criteria of a stabilised approach, from a check height down to the start of the flare."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.gates import Bound, Gate, judged_gate
 from groundstation.results.rules import Rejudged
 from groundstation.systems.landing.answer import (

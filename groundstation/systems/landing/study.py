@@ -6,10 +6,11 @@ written down before it was run: finals on any course anywhere, INS errors of som
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.geodesy import METRES_PER_DEG
 from groundstation.chapters.parts import Section

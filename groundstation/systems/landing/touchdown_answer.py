@@ -1,8 +1,8 @@
 """Touchdown of an approach: time by its witnesses, place, manner."""
 
-from dataclasses import dataclass
 from typing import Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.words import clock_text
 from groundstation.results.frames import Brief
 

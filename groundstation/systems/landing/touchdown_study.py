@@ -5,11 +5,12 @@ assumption.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.chapters.parts import Section
 from groundstation.results.figures import FigureData
 from groundstation.simulation.touchdown import (

@@ -2,8 +2,9 @@
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.shipped_toml import ShippedToml, TomlFile
 from groundstation.base.toml_settings import check_ranges, number, settings_from
 from groundstation.base.version import __version__

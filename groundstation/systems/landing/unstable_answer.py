@@ -1,10 +1,10 @@
 """Share of unstable approaches in a folder of flights, by runway and aircraft."""
 
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.serial import to_json
 from groundstation.results.figures import FigureData
 

@@ -3,12 +3,12 @@
 Each gives the likelihood of the touchdown over a grid of times, or the reason why it shows none.
 """
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import MPS2_PER_G
 from groundstation.tables.motion import runs

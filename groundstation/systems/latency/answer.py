@@ -1,8 +1,9 @@
 """Answer of the latency estimator: delay of each sensor behind the motion of the INS."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, ClassVar, Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.roles import Delay, Delays

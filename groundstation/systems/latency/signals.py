@@ -1,13 +1,14 @@
 """Signals of an INS and of another sensor that show the same motion, ready to compare."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import direction_of, unwrap
 from groundstation.base.attitude import rotation_n_from_b
+from groundstation.base.dataclasses import dataclass
 from groundstation.methods.lag.settings import SLOW_MPS, LatencySettings
 from groundstation.methods.lag.windows import ReferenceSignals
 from groundstation.systems.latency.answer import Quantity

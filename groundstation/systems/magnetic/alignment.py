@@ -9,8 +9,9 @@ added.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.units import S_PER_H
 from groundstation.base.words import counted
 from groundstation.results.roles import AzimuthByTurns, HeadingByTrack

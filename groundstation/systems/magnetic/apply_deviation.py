@@ -3,11 +3,12 @@
 The deviation is the flight's own or another's.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.records import Column, RecordBatch

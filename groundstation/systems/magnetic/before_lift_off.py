@@ -6,10 +6,11 @@ The heading analysis is run there once more.
 import math
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import EVENT_SEPARATOR, topics_of_kind
 from groundstation.methods.roles import HeadingOnGround

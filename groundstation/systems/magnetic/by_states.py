@@ -4,11 +4,11 @@ No magnetometer is in them.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.results.arrays.states import BodyStates
 from groundstation.results.roles import StatesAlongTheFlight

@@ -3,12 +3,11 @@
 Opposite banks are averaged.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray
 from groundstation.methods import harmonics
 from groundstation.systems.magnetic.manoeuvre import BINS

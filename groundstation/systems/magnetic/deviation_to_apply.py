@@ -2,10 +2,10 @@
 
 import hashlib
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UsageError
 from groundstation.results.file_names import SUMMARY
 from groundstation.systems.applied import Asked

@@ -4,10 +4,10 @@ The turns make the figures.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import BoolArray
 from groundstation.results.arrays.states import BodyStates

@@ -4,11 +4,10 @@ A flux valve hangs in a Hooke's joint: in a turn it leans with the apparent vert
 field. What is displayed may be a gyro that the valve corrects over minutes.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray
 from groundstation.methods import harmonics
 from groundstation.systems.magnetic.flux_answer import BankError

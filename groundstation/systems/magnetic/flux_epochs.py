@@ -1,12 +1,12 @@
 """Epochs of a flight with magnetic heading, motion and field, about one a second."""
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, unwrap, wrap_180, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.declination import declination_along
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import BoolArray, Int64Array

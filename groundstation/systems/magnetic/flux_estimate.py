@@ -1,11 +1,12 @@
 """Deviation of a flux valve in flight: straight legs and turns against a true heading."""
 
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import BoolArray
 from groundstation.base.words import counted, listed

@@ -1,11 +1,10 @@
 """A to E of a flux valve from its legs, weighed over the lags that the turns leave open."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.methods import harmonics
 from groundstation.systems.magnetic.answer import Residual

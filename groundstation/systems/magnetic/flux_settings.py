@@ -1,7 +1,6 @@
 """Settings of the deviation of a flux valve in flight: every limit of the method."""
 
-from dataclasses import dataclass
-
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import check_ranges, number
 

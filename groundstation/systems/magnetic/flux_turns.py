@@ -1,10 +1,9 @@
 """Opposite turns of a flux valve, and what bank and lag leave in their mean."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.methods import harmonics
 from groundstation.results.roles import LETTERS

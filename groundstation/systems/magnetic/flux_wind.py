@@ -4,13 +4,13 @@ Ground velocity less wind has the length of the true airspeed: on several headin
 direction of the nose. The wind may change; what the flight shows of that is in the sigma.
 """
 
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from groundstation.base.angles import FloatArray, direction_of
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.systems.magnetic.flux_epochs import FluxEpochs
 from groundstation.systems.magnetic.flux_settings import MagneticFluxSettings

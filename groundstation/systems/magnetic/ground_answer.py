@@ -3,9 +3,10 @@
 The deviation is given by each run, and by all together.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar, Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.roles import LETTERS

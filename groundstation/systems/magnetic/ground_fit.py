@@ -1,13 +1,13 @@
 """A to E of a heading sensor from a few runs: what they show, and what they cannot."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.words import listed
 from groundstation.methods import harmonics
 from groundstation.results.roles import LETTERS

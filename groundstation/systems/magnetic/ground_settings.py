@@ -1,7 +1,6 @@
 """Settings of the deviation from ground runs. Every limit of the method stands here."""
 
-from dataclasses import dataclass
-
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import check_ranges, number
 

@@ -3,11 +3,10 @@
 The drift is what the gyros show beyond the rotation of the earth.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.base.records import BoolArray
 from groundstation.base.units import DEG_PER_RAD, S_PER_H

@@ -1,11 +1,10 @@
 """Residual of each correction on the part of the flight that no fit has seen."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray
 from groundstation.base.units import S_PER_H
 from groundstation.methods import harmonics

@@ -1,12 +1,12 @@
 """Iron of the aircraft: its effect on the field, the heading, and opposite banks' average."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 from groundstation.systems.magnetic.answer import Matrix, PoissonParameters, vector_of
 from groundstation.systems.magnetic.attitude import field_in_body, levelled_heading_deg

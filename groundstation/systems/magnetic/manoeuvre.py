@@ -1,12 +1,13 @@
 """Figure in the log: turns of steady bank, opposite ones covering the circle together."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, unwrap, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray
 from groundstation.systems.magnetic.answer import Turn
 from groundstation.systems.magnetic.readings import Readings

@@ -1,10 +1,11 @@
 """Hard and soft iron from readings and attitude: twelve parameters, three of the current."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.declination import HORIZONTAL_SIGMA_NT, NORTH_EAST_DOWN_SIGMA_NT
 from groundstation.methods import harmonics
 from groundstation.systems.magnetic.attitude import field_in_body, levelled_heading_deg

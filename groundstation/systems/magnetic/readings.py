@@ -1,11 +1,12 @@
 """Readings that the method uses: the magnetometer with the INS attitude at the same times."""
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind

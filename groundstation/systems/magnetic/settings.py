@@ -1,7 +1,6 @@
 """Settings of the magnetic estimator. Every limit of the method stands here."""
 
-from dataclasses import dataclass
-
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_settings import check_ranges, number
 
 LIMITS = frozenset(  # settings that bound a gate and choose no data: a change of them needs no log

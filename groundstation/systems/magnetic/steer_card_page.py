@@ -1,9 +1,9 @@
 """Steer card for the cockpit, a page of A6 beside a flight's report."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.chapters.parts import Mark, Paper
 from groundstation.chapters.wording import ABSENT, is_number, number, typeset

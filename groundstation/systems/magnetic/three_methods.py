@@ -1,11 +1,12 @@
 """The three ways to find the deviation, side by side, and the one to correct by."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.methods import harmonics
 from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.answer import Method, MethodName

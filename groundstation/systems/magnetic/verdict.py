@@ -1,8 +1,9 @@
 """Gates and verdict of the magnetic deviation."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.gates import Bound, Gate, GateState, judged_gate
 from groundstation.results.rules import Rejudged
 from groundstation.systems.magnetic.alignment import against_heading

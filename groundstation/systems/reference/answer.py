@@ -3,9 +3,10 @@
 The errors are those of what was recorded and of what was estimated.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, ClassVar, Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 

@@ -1,12 +1,13 @@
 """Errors of positions, velocities and angles against the reference: estimate - reference."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from types import MappingProxyType
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, direction_of, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import curvature_radii_m
 from groundstation.base.records import Int64Array, frozen
 from groundstation.base.units import NS_PER_S

@@ -1,11 +1,12 @@
 """Rows of the answer: errors along every axis with their statistics, claimed against seen."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, frozen
 from groundstation.systems.reference.answer import ClaimRow, ErrorRow, Quantity
 from groundstation.systems.reference.errors import Errors

@@ -9,11 +9,10 @@ A subject that stands ``arm`` away in body axes and shows its positions ``offset
 Turns tell the arm from the constant, changes of speed and of direction the offset from the arm ahead.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import student_quantile
 from groundstation.systems.reference.answer import Observed, Placed
 from groundstation.systems.reference.errors import Errors

@@ -4,10 +4,10 @@ Errors in the band claimed, plan view, claimed against seen.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.chapters.plots.common import label
 from groundstation.chapters.wording import MINUS

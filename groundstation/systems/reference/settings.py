@@ -1,8 +1,8 @@
 """Settings of the comparison with a reference. Every limit of the method stands here."""
 
-from dataclasses import dataclass
 from typing import Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_settings import check_ranges, number
 
 UseArm = Literal["when_observed", "never"]

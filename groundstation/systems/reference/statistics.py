@@ -1,11 +1,11 @@
 """Statistics of time-correlated errors: intervals by the effective number of samples."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95, chi_square_quantile, student_quantile
 from groundstation.base.records import BoolArray
 from groundstation.methods.intervals import effective_samples, share_interval

@@ -4,10 +4,10 @@ It may stand at another place, use another datum or clock, or be too coarse.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.findings import Finding
 from groundstation.base.signals import kind_of
 from groundstation.systems.reference.answer import ErrorRow, ReferenceResult, title_of

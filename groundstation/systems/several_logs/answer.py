@@ -1,8 +1,9 @@
 """Clock that several logs of one flight share, and the sources that analyses use of them."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar, Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.frames import Brief

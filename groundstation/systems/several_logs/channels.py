@@ -1,11 +1,11 @@
 """Signals that two logs have of one motion: a pair of topics, one of each log."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, unwrap
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S

@@ -1,10 +1,9 @@
 """Coarse search for the lag between two motions on an even grid, and for clock steps."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.systems.several_logs.channels import SignalPair, TopicSignals
 from groundstation.systems.several_logs.settings import TwoClocksSettings
 

@@ -3,12 +3,13 @@
 Both come with their intervals.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, direction_of, unwrap
 from groundstation.base.attitude import rotation_n_from_b
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95, student_quantile
 from groundstation.methods.lag.fit import DelayFit, fit_delay
 from groundstation.methods.lag.settings import SLOW_MPS, LatencySettings

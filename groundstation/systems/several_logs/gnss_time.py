@@ -1,10 +1,9 @@
 """Clock of a log against GNSS time, as far as the log itself tells it."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.clock import Clock
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S

@@ -1,10 +1,11 @@
 """Relation of the clocks of two logs of the same flight, by GNSS time and by motion."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import north_east_m
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind

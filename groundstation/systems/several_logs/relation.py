@@ -1,11 +1,11 @@
 """Offset and drift between the clocks of two logs of a flight, with 95 % intervals."""
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import Int64Array
 from groundstation.base.units import NS_PER_S

@@ -1,7 +1,6 @@
 """Settings of the relation between two clocks. Every limit of the method stands here."""
 
-from dataclasses import dataclass
-
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_settings import check_ranges, number
 
 

@@ -3,8 +3,7 @@
 No sideways motion, barometer, wheels, magnetic heading.
 """
 
-from dataclasses import dataclass
-
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_settings import number
 
 

@@ -4,12 +4,13 @@ They are tried together, judged, and left out where one does not fit.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.systems.trajectory import compass_rows, observations
 from groundstation.systems.trajectory.aid_settings import AidSettings
 from groundstation.systems.trajectory.aids_answer import AidName, AidRow

@@ -1,7 +1,8 @@
 """Aids of a trajectory beside GNSS: which were used, and why another was not."""
 
-from dataclasses import dataclass
 from typing import Literal
+
+from groundstation.base.dataclasses import dataclass
 
 AidName = Literal["no sideways motion", "barometer", "wheel speed", "magnetic heading"]
 

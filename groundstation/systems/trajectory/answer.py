@@ -1,9 +1,10 @@
 """Answer of the best trajectory: state, accuracy, checks, errors of the on-board filter."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, ClassVar, Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.results.answer import Answer
 from groundstation.results.arrays.states import BodyStates

@@ -10,11 +10,10 @@ singular values s of sum b u' and d the sign of its determinant; with -d for lef
 Source: Markley, Attitude determination using vector observations and the singular value decomposition, 1988.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 from groundstation.systems.trajectory.axis_turns import axis_turns
 from groundstation.systems.trajectory.mounting_settings import MountingSettings

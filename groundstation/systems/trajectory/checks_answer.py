@@ -1,8 +1,8 @@
 """Checks of the trajectory on its own log, as the answer tells them."""
 
-from dataclasses import dataclass
 from typing import Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.systems.trajectory.quantity_answer import Quantity
 
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null

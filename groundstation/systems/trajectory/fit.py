@@ -10,10 +10,10 @@ Trans. Automatic Control 15, 1970; J. Nocedal, S. J. Wright, Numerical Optimizat
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.systems.trajectory.model import Model
 from groundstation.systems.trajectory.score import Scored
 from groundstation.systems.trajectory.states import FloatArray

@@ -1,9 +1,8 @@
 """Residuals of GNSS against the smoothed solution, and of fixes that were held out of it."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import BoolArray
 from groundstation.systems.trajectory.arrays import TrajectoryResiduals

@@ -1,7 +1,6 @@
 """Input of a trajectory with the facts about it: topics, clock, gaps, sigmas."""
 
-from dataclasses import dataclass
-
+from groundstation.base.dataclasses import dataclass
 from groundstation.systems.trajectory.inputs import GnssFixes, ImuIncrements
 
 

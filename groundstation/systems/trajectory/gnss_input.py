@@ -1,13 +1,13 @@
 """Fixes of the receiver of a flight, with the source of their sigmas."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import BoolArray
 from groundstation.base.signals import topics_of_kind

@@ -1,10 +1,9 @@
 """Increments of the inertial unit of a flight, from the tables of its log."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.words import counted, listed

@@ -1,10 +1,11 @@
 """Samples of an inertial unit from its table, in the order in which it made them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import BoolArray, Column
 from groundstation.base.units import DEG_PER_RAD

@@ -1,10 +1,11 @@
 """Samples of an inertial unit on lines of time, and as increments that touch."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray
 from groundstation.base.words import counted
 from groundstation.systems.trajectory.gathered import InputNote

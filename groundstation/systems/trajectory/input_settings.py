@@ -1,7 +1,6 @@
 """Settings of the input of the trajectory: which unit and receiver, and what is a gap."""
 
-from dataclasses import dataclass
-
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_settings import number
 
 

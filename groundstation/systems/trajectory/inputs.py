@@ -1,10 +1,11 @@
 """Input of the trajectory estimator: increments of an inertial unit, fixes of a receiver."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, frozen
 
 FloatArray = NDArray[np.float64]

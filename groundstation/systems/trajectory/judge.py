@@ -1,9 +1,10 @@
 """Factors by which sigmas are raised, never lowered, and the state of an answer."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import BoolArray
 from groundstation.systems.trajectory.checks_answer import AgainstOwnTrack, OutageRow, RaisedSigma

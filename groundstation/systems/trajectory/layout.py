@@ -1,10 +1,10 @@
 """Lay out a pass: samples with their gaps filled, epochs, measurements in their order."""
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 from groundstation.systems.trajectory.inputs import ImuIncrements
 from groundstation.systems.trajectory.observations import Observations

@@ -1,9 +1,10 @@
 """Numbers of the model: noise of the unit, errors of GNSS, sigmas at the start."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.units import MPS2_PER_G
 from groundstation.systems.trajectory.observations import Observations
 from groundstation.systems.trajectory.states import (

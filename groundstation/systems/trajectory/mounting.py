@@ -6,12 +6,13 @@ believed the unit is held against GNSS: mirrored or swapped axes, wrong units, a
 are refused.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 from groundstation.base.words import counted
 from groundstation.systems.trajectory.axis_hypotheses import Explanation, ranked, relation_of

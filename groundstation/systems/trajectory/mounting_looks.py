@@ -1,10 +1,9 @@
 """Looks at how a case stands to the body: gravity, travel, speeding up, turning."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.systems.trajectory.axis_hypotheses import attitudes, carry
 from groundstation.systems.trajectory.mounting_settings import MountingSettings
 from groundstation.systems.trajectory.short_spans import QUIET_MPS2, Spans, Steps, Sums

@@ -1,7 +1,6 @@
 """Limits by which the mounting of an inertial unit is found or refused."""
 
-from dataclasses import dataclass
-
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_settings import check_ranges, number
 
 

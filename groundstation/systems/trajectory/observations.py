@@ -1,11 +1,12 @@
 """Observations of a pass in one list: GNSS, standstill, no slip, aids."""
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.systems.trajectory.fix_motion import motion_of
 from groundstation.systems.trajectory.inputs import AidReadings, GnssFixes

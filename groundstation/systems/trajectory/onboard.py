@@ -4,11 +4,12 @@ An offset that is the same all through the log is how the units are mounted, or 
 of another datum. It is told and taken off; the filter is never blamed for it. A delay of its stamps likewise.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.systems.trajectory.arrays import TrajectoryOnboard
 from groundstation.systems.trajectory.onboard_answer import OnboardErrors
 from groundstation.systems.trajectory.onboard_axes import FilterAxes, axes_of

@@ -1,8 +1,8 @@
 """Errors of the on-board filter, as the answer tells them."""
 
-from dataclasses import dataclass
 from typing import Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.words import clock_text, with_half
 from groundstation.results.frames import Brief
 from groundstation.systems.trajectory.quantity_answer import OPENING_ERROR, Quantity

@@ -6,13 +6,12 @@ shows the yaw of T, whatever the filter's heading is; a vehicle that only yaws l
 constant in the body cannot be told from T: of tilt only an autopilot's own axes are known.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180
 from groundstation.base.attitude import rotation_n_from_b
+from groundstation.base.dataclasses import dataclass
 from groundstation.systems.trajectory.onboard_offsets import euler_deg
 from groundstation.systems.trajectory.onboard_output import FEWEST, FilterOutput
 from groundstation.systems.trajectory.solution import FloatArray, TrackOfStates

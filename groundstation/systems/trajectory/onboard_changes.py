@@ -4,10 +4,9 @@ A filter whose error is constant before a moment and has another constant behind
 difference alone does not tell in which, for a constant may be mounting, antenna or datum.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import BoolArray
 from groundstation.systems.trajectory.onboard_answer import ChangeOfConstant, WrongSpan

@@ -1,11 +1,10 @@
 """Errors of an on-board filter at its samples: constants found and taken off."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import mean_heading, wrap_180
 from groundstation.base.attitude import rotation_n_from_b
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import north_east_m
 from groundstation.systems.trajectory.figures import offsets_m
 from groundstation.systems.trajectory.onboard_offsets import (

@@ -5,10 +5,10 @@ estimator_attitude with estimator_local_position of PX4.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.nearest import nearest_rows
 from groundstation.base.records import Column
 from groundstation.base.signals import topics_of_kind

@@ -1,9 +1,10 @@
 """Output of an on-board filter, from the tables of its log."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import has_position
 from groundstation.base.records import HEADING_IS_TRACK
 from groundstation.systems.trajectory.onboard_filters import LoggedFilter

@@ -3,11 +3,12 @@
 Errors are against the undisturbed solution, with their sigmas.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Literal
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.systems.trajectory.estimate import Estimate

@@ -1,9 +1,8 @@
 """A pass over a log: filter forward, smoother back, states at the times of the samples."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import curvature_radii_m
 from groundstation.systems.trajectory.backward import run_backward
 from groundstation.systems.trajectory.forward import BLOCK, run_forward

@@ -1,10 +1,9 @@
 """Check of barometric heights against those of GNSS: stuck, of another unit, with a jump."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.units import M_PER_FOOT
 from groundstation.systems.trajectory.aid_settings import AidSettings
 from groundstation.systems.trajectory.inputs import GnssFixes

@@ -4,12 +4,13 @@ Stamps are late by a few milliseconds, come in batches, repeat or go back; the u
 length of each interval.
 """
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
+
+from groundstation.base.dataclasses import dataclass
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

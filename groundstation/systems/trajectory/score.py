@@ -7,11 +7,12 @@ Source: S. J. Koopman, N. Shephard, Exact score for time series models in state 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.compile import in_place
+from groundstation.base.dataclasses import dataclass
 from groundstation.methods.kalman.arrays import Pattern
 from groundstation.systems.trajectory.backward import back_over_scalar, back_over_step
 from groundstation.systems.trajectory.forward import BLOCK

@@ -3,10 +3,11 @@
 Each is estimated, the noise fitted to the longest.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.systems.trajectory.aid_settings import AidSettings
 from groundstation.systems.trajectory.aiding import aided, of_span, used_alone

@@ -1,7 +1,8 @@
 """Settings of the best trajectory: input, mounting, what is refused or doubtful."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_settings import check_ranges, number
 from groundstation.systems.trajectory.aid_settings import AidSettings
 from groundstation.systems.trajectory.input_settings import InputSettings

@@ -6,11 +6,10 @@ turn about the axes of its accelerometers, and it is on the vehicle that GNSS is
 the axes of the gyros against those of the accelerometers, a mirrored axis or wrong units leave a misfit.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import north_east_m
 from groundstation.base.records import Int64Array
 from groundstation.base.units import MPS2_PER_G

@@ -1,9 +1,8 @@
 """Direction of travel in the axes of the unit; what rolls does not slip."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.systems.trajectory.observations import Observations
 from groundstation.systems.trajectory.solution import TrackOfStates
 from groundstation.systems.trajectory.states import NO_SLIP, FloatArray

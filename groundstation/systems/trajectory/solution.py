@@ -1,10 +1,11 @@
 """Solution of the trajectory estimator: states over time with their sigmas."""
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array, frozen
 
 FloatArray = NDArray[np.float64]

@@ -1,11 +1,12 @@
 """Best trajectory of a flight: input, mounting, estimate, honesty gate, answer."""
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from groundstation.base.angles import wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.results.gates import Gate, judged_gate

@@ -1,11 +1,11 @@
 """Tab of the overview: track, height, speed, attitude and state, a row for each answer."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 import rerun.blueprint as rrb
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.chapters.front import front
 from groundstation.chapters.markdown import front_markdown
 from groundstation.results.arrays.flight import GnssLanes, Overview, PhaseSpans, StateLanes

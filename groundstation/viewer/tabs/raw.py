@@ -6,11 +6,11 @@ most rows at one instant) are tables.
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 import rerun.blueprint as rrb
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.signals import RAW_PREFIX, TOPICS, field_of, kind_of
 from groundstation.base.source_units import source_units

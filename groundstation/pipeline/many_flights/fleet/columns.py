@@ -6,9 +6,10 @@ Every flight has some columns; between them stand those that each analysis gives
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.methods.fleet.density import SampleHistogram
 from groundstation.reports.index import IndexRow
 from groundstation.results.columns import FlightColumn

@@ -8,11 +8,12 @@ whole, the hidden one last, so that a run that is killed leaves a month that is 
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.many_flights.fleet.columns import FlightShare, dataset_schema

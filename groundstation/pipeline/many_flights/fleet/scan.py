@@ -7,7 +7,7 @@ What has not changed is not read again.
 
 import os
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from hashlib import blake2b
 from pathlib import Path
@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.version import __version__
 from groundstation.pipeline.many_flights.fleet.columns import DETAILS, FLIGHT_COLUMNS, dataset_schema

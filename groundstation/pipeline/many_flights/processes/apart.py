@@ -10,11 +10,11 @@ import os
 import pickle
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator
-from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, Generic, TypeVar
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UsageError
 from groundstation.base.serial import MismatchError, from_json
 from groundstation.pipeline.many_flights.processes.confined import ProcessLimits, begin

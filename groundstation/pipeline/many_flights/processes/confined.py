@@ -16,11 +16,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from multiprocessing import parent_process
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, NoReturn
+
+from groundstation.base.dataclasses import dataclass
 
 LOOK_EVERY_S = 0.05
 ROOM_BYTES = 32 << 30  # of addresses beyond the memory: libraries set aside much more than they use

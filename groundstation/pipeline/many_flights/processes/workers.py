@@ -13,12 +13,13 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from functools import partial
 from multiprocessing.connection import Connection
 from multiprocessing.connection import wait as wait_for
 from typing import Any, Generic
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.without_pandas import spare_pandas
 from groundstation.pipeline.many_flights.processes.crew import AnyJob, Work
 from groundstation.pipeline.one_flight.outcome import Outcome

@@ -6,9 +6,10 @@ the run moves it into place. A rename is not atomic in a bucket: the manifest, w
 
 import tempfile
 import uuid
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.pipeline.many_flights.inputs import is_remote
 from groundstation.pipeline.many_flights.remote.folder import RemoteFolder

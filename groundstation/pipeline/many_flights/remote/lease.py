@@ -11,8 +11,8 @@ import time
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S

@@ -5,10 +5,10 @@ They are found by where each begins and ends.
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import chain, pairwise
 from pathlib import Path
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.many_flights.runs.known_flights import KnownFlights

@@ -6,9 +6,9 @@ They are jobs on the MCAPs just made, with the stations beside the logs.
 from collections.abc import Callable, Sequence
 from collections.abc import Set as AbstractSet
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, SettingsError
 from groundstation.base.findings import Finding
 from groundstation.pipeline.many_flights.fleet.scan import Scan

@@ -3,10 +3,11 @@
 import hashlib
 import platform
 from collections.abc import Collection, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.failures import is_incomplete
 from groundstation.base.findings import Finding

@@ -11,12 +11,12 @@ method, SIAM Journal on Optimization 4(3), 1994; Bierman, Factorization Methods 
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 
 KEPT_BYTES = 1e8  # of what a pass keeps for the way back; beyond, pieces are passed again

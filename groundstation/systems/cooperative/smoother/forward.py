@@ -4,11 +4,10 @@ It gates, and where no reading of a vehicle fits any more it opens what is in do
 first rejection on; then the pass is made again.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.loop_types import HEIGHT, PEER

@@ -4,11 +4,10 @@ Readings and outputs that are close together share a knot; they see its state th
 were exact over so short a time. How close is close follows from the noise of the motion and that of the readings.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.nearest import nearest_rows
 from groundstation.base.records import Int64Array
 from groundstation.systems.cooperative.aircraft import Aircraft

@@ -1,11 +1,11 @@
 """Joint state of the smoother: groups of vehicles, then constants (ground points, pairs)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 from groundstation.systems.cooperative.aircraft import Aircraft
 from groundstation.systems.cooperative.events import Prepared

@@ -3,11 +3,10 @@
 The predictions are those of ``observation.py`` and of the wheeled vehicles' sensors, for many readings at once.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.systems.cooperative.events import Prepared

@@ -4,10 +4,10 @@ All is done for many vehicles and times at once. A state stands at a knot; a rea
 motion from there.
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 
 Motion = tuple[FloatArray, FloatArray, FloatArray]  # moved states (..., n), transitions and noise (..., n, n)

@@ -8,12 +8,12 @@ over the knots.
 Source: Barfoot, State Estimation for Robotics, 2nd ed. 2024, chapters 3 to 5 (batch, robust costs).
 """
 
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.loop_types import GATED, USED

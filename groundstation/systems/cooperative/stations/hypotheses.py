@@ -7,11 +7,11 @@ once, so each is asked at the level of the session over the number of questions 
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.records import frozen
 from groundstation.systems.cooperative.stations.information import EACH, StationInformation

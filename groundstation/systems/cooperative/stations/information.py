@@ -10,11 +10,12 @@ approach to the detection and estimation of jumps in linear systems, 1976; Baard
 geodetic networks, 1968.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.nearest import nearest_rows
 from groundstation.base.records import Int64Array, frozen
 from groundstation.systems.cooperative.events import Prepared, prepare

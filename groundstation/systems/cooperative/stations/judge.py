@@ -7,11 +7,12 @@ too long by a delay that no shift explains is left out. The rounds end when noth
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.datums import BY_NAME, DATUMS
 from groundstation.base.ecef import ecef_from_n, geodetic_deg_m
 from groundstation.base.quantiles import NORMAL_95

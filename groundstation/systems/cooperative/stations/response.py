@@ -1,12 +1,12 @@
 """Response of the smoother's problem to columns of residuals."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.systems.cooperative.smoother.chain import KEPT_BYTES, Problem, add_blocks, turned
 
 _State = tuple[FloatArray, FloatArray]  # covariance and means after a knot's rows

@@ -8,12 +8,13 @@ check rests on, the stated sigmas.
 import os
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from multiprocessing import get_context
 from typing import Literal
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.chapters.parts import Section
 from groundstation.methods.intervals import nees_limits
 from groundstation.results.figures import FigureData

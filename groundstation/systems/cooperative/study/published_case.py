@@ -1,8 +1,8 @@
 """One published figure of navigation between aircraft, and the session for it."""
 
-from dataclasses import dataclass
 from typing import Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.systems.cooperative.settings import Update
 
 FACTOR = 2.0  # a figure of ours within so many times of the published one counts as the same

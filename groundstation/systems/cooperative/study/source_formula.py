@@ -17,12 +17,12 @@ state-space methods to navigation problems, 1966.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import accumulate, pairwise
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.loop_types import PEER, POINT
 from groundstation.systems.cooperative.settings import CooperativeSettings

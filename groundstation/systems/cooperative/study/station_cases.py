@@ -6,10 +6,11 @@ them: range errors that stay for 5 and 30 s, INS and clocks worse than believed,
 stations off at once.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.datums import DATUMS
 from groundstation.simulation.session_scenario import (
     SessionErrorSigmas,

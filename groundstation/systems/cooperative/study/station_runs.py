@@ -3,12 +3,13 @@
 import os
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from multiprocessing import get_context
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.datums import DATUMS
 from groundstation.base.geodesy import curvature_radii_m
 from groundstation.simulation.session import SimulatedSession, simulate_session

@@ -1,8 +1,8 @@
 """Answer of the heading analysis with what earlier flights taught of the installation."""
 
-from dataclasses import dataclass
 from typing import ClassVar
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.installations import LearnedHeading

@@ -14,12 +14,13 @@ likeliest are kept. What follows for a flight is therefore a mixture of normal d
 exact but for the histories that were left out.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.installations import Installed, Lesson
 from groundstation.systems.heading.installation.settings import GROSS_DEG, InstallationSettings
 

@@ -1,12 +1,12 @@
 """Learned answer of a flight: both numbers, their intervals in parts, and the verdict."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.methods.intervals import mixture_quantile

@@ -2,8 +2,9 @@
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.installations import Installation, InstalledFlight, Lesson, Pooled
 from groundstation.systems.heading.installation.answer import InstallationResult
 from groundstation.systems.heading.installation.model import Belief, doubts, first_belief, installed, learn

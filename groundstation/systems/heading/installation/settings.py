@@ -1,8 +1,8 @@
 """Prior of an installation before its first flight, and how often it changes unsaid."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.installations import NAMED_PROBABILITY
 
 ALIGNMENTS: Mapping[str, float] = {"gyrocompass": 0.1, "stored": 1.0}  # sigma of the heading error, deg, by kind

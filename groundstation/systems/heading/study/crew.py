@@ -5,13 +5,14 @@ Acceptance, coverage, both numbers.
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.results.figures import FigureData
 from groundstation.simulation.processes import damped_oscillation

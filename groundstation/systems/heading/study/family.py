@@ -4,13 +4,14 @@ Errors, coverage of both intervals, acceptance by gate.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.results.arrays.typed import found_in
 from groundstation.results.figures import FigureData

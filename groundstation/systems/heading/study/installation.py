@@ -5,11 +5,11 @@ Coverage, half widths, acceptance.
 
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.chapters.parts import Section
 from groundstation.results.figures import FigureData

@@ -4,11 +4,12 @@ Aircraft with mountings, factors and winds, and what their flights show.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.results.installations import Lesson
 from groundstation.systems.heading.gates_answer import CURED_BY_MORE_DATA, WHOLE

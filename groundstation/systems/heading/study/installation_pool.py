@@ -4,11 +4,12 @@ Fleets of docs/evidence/installation.md draw from it.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.figures import FigureData
 from groundstation.simulation.taxi import draw_case, simulate_taxi, taxi_flight
 from groundstation.systems.heading.answer import HeadingResult

@@ -1,10 +1,11 @@
 """Cases of the forecast study: how the truth is made, and what the filter believes of it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.units import MPS2_PER_G
 from groundstation.methods.ins_noise import GnssNoise, InsNoise, load_class
 from groundstation.simulation.channel_truth import RADIUS_M

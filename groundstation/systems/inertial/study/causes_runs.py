@@ -2,13 +2,14 @@
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 from zlib import crc32
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.methods.ins_noise import load_class
 from groundstation.simulation.inertial_family import ORDINARY_RECEIVER, GnssErrorModel, draw_gnss_errors
 from groundstation.simulation.ins_class import InsClass, draw_instrument, load_ins_class

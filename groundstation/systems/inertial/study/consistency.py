@@ -3,11 +3,10 @@
 NEES of all six states and NIS against chi-square.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.records import Int64Array
 from groundstation.base.units import MPS2_PER_G

@@ -1,11 +1,12 @@
 """Flights of the study of alignment and shutdown: simulated, judged, kept small."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.units import M_PER_NAUTICAL_MILE
 from groundstation.simulation.ins_parked import ParkedFlight, ParkedSettings, simulate_parked

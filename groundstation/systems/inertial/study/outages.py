@@ -4,12 +4,13 @@ The smoother inside them, the forecasts through and after them, and their bands.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from zlib import crc32
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.results.figures import FigureData
 from groundstation.simulation.inertial_family import simulate_family

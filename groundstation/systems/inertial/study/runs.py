@@ -4,12 +4,13 @@ A small outcome of each is kept.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import partial
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 from groundstation.results.forecast_methods import FORECAST_METHODS
 from groundstation.simulation.inertial_family import ErrorBatch, simulate_family

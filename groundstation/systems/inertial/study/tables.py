@@ -4,11 +4,11 @@ RMS, ratios and findings with intervals over flights, held-out scores, honesty.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.records import frozen
 from groundstation.results.figures import FigureData

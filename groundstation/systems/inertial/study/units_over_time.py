@@ -4,11 +4,11 @@ Rates are drawn, not flown: what is judged is the statistics over flights.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.methods.fleet.confidence import share_high, share_low
 from groundstation.methods.fleet.units import FlownUnit, histories_of
 from groundstation.results.figures import FigureData

@@ -1,12 +1,13 @@
 """Flights of the study of several units: each simulated and judged, a small outcome kept."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.geodesy import displaced_deg
 from groundstation.simulation.ins_units.family import (

@@ -1,10 +1,11 @@
 """One approach by bearings: places along it, deviations with sigmas, plausibility checks."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, frozen
 from groundstation.methods.bearings import BearingFix, solve_bearings
 from groundstation.systems.known import Runway

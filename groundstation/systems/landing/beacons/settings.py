@@ -1,7 +1,6 @@
 """Settings of landing by locators."""
 
-from dataclasses import dataclass
-
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.toml_settings import check_ranges, number
 
 

@@ -3,11 +3,10 @@
 The bias grows with a power of the bank.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 from groundstation.simulation.deviation import deviation_truth
 from groundstation.simulation.scenario import MagnetometerSettings

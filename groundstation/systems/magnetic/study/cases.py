@@ -1,8 +1,9 @@
 """Cases of the magnetic study: families of flights, sweeps, incomplete figures."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.simulation.legs import AirTurn, Leg
 from groundstation.simulation.magnetic_family import MagneticFamilySettings
 

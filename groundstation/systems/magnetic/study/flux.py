@@ -1,10 +1,11 @@
 """Monte Carlo study of a flux valve in flight: coverage of A to E, cell by cell."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.chapters.parts import Section

@@ -1,10 +1,11 @@
 """Errors of the methods on a simulated flight, judged by the truth; honesty of sigmas."""
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, unwrap, wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import frozen

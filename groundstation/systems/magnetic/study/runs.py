@@ -4,8 +4,9 @@ A small outcome of each is kept.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.simulation.magnetic_family import MagneticFamilySettings, draw_magnetic_scenario
 from groundstation.systems.magnetic.study.bias import Biases, formula_biases
 from groundstation.systems.magnetic.study.cases import (

@@ -6,11 +6,11 @@ Errors of every method, the claim and its limit, honesty of sigmas, refusals.
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, frozen
 from groundstation.methods.intervals import share_interval
 from groundstation.results.figures import FigureData

@@ -5,11 +5,12 @@ turns where the taxi may not.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
 from groundstation.methods.roles import HeadingOnGround

@@ -3,9 +3,10 @@
 It also tells how honest that accuracy is.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.answer import PlanAnswer
 from groundstation.results.figures import FigureData
 

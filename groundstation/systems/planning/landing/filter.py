@@ -1,10 +1,9 @@
 """Filter of the approach on simulated or recorded ranges, and its covariance without any."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 from groundstation.methods.kalman.transition import Transition
 from groundstation.results.landing_categories import axis_95_m, radius_95_m

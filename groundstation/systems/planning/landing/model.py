@@ -7,11 +7,10 @@ rate (m/s); then the moving point's along, right, up (m); then one slow range er
 Error = reading - truth.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 from groundstation.methods.link_dynamics import discretise, local_dynamics
 from groundstation.systems.planning.landing.scenario import RangeApproach

@@ -4,11 +4,10 @@ Local criterion: at every step the speed, within reach of the acceleration, whos
 largest measure of observability det(H'H), where a row of H is the direction to a point and 1 for the clock.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 from groundstation.systems.planning.landing.scenario import RangeApproach
 

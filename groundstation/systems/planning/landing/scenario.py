@@ -5,12 +5,13 @@ direction of landing), right and up from the middle of the threshold, metres. A 
 negative along; the scenario states distances before the threshold as positive numbers.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.records import frozen
 from groundstation.base.toml_settings import check_ranges, number, required_number

@@ -1,10 +1,9 @@
 """Simulated approaches: drawn errors are filtered and compared with the filter's sigmas."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 from groundstation.methods.intervals import nees_limits
 from groundstation.systems.planning.landing.filter import filter_ranges, nominal_readings, with_errors

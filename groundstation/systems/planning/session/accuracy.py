@@ -7,13 +7,13 @@ Source: Skrypnik, Inter-aircraft navigation in air traffic management, 2010, cha
 as function of the control; the adjoint is that of the sequential scalar update (see :func:`_carry_back`).
 """
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.compile import compiled
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array, frozen
 from groundstation.methods.kalman.filter import FilterRun, Measurements, Start, run_filter
 from groundstation.methods.kalman.transition import Transition

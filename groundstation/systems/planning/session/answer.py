@@ -1,8 +1,9 @@
 """Answer of a planned session: best motion of aircraft, and the accuracy that follows."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar, Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.answer import PlanAnswer
 from groundstation.results.figures import FigureData
 

@@ -7,11 +7,11 @@ tells how far from a stationary point one is).
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 
 Project = Callable[[FloatArray], FloatArray]

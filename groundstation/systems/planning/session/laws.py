@@ -5,13 +5,13 @@ Source: Skrypnik, Inter-aircraft navigation in air traffic management, 2010, cha
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import frozen
 from groundstation.systems.planning.session.accuracy import PLACE, AccuracyModel
 from groundstation.systems.planning.session.descent import Minimum, minimise, nearest_law

@@ -8,11 +8,11 @@ Source: Skrypnik, Inter-aircraft navigation in air traffic management, 2010, equ
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.systems.planning.session.scenario import Axis, LocalCriterion
 
 COLUMN: dict[Axis, int] = {"north": 0, "east": 1, "up": 2, "clock": 3}

@@ -5,12 +5,12 @@ with the mean speed along the mean heading. All controls have one unit, m/s: hea
 at the start, so that a gradient step means the same for both.
 """
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.findings import Finding
 from groundstation.base.records import frozen
 from groundstation.systems.planning.session.scenario import NEAREST_M, Controlled, SessionPlan

@@ -1,10 +1,11 @@
 """Placement of ground points: comparison of every design, a map, and remarks."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.findings import Finding
 from groundstation.results.figures import FigureData
 from groundstation.systems.planning.session.accuracy import PLACE, AccuracyModel

@@ -1,8 +1,9 @@
 """Answer of a planned session: best places of ground points."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.answer import PlanAnswer
 from groundstation.results.figures import FigureData
 

@@ -1,10 +1,11 @@
 """Plan of a session: every law of control side by side, with findings."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_360
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.findings import Finding
 from groundstation.results.answer import by_analysis

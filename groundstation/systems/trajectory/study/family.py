@@ -1,9 +1,10 @@
 """Families of simulated logs for the study, and the model that knows their noise."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.simulation.imu.families import Family
 from groundstation.simulation.imu.imu_class import load_imu_class
 from groundstation.simulation.imu.settings import ImuSettings, ReceiverSettings, StampSettings

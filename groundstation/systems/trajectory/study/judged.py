@@ -1,10 +1,9 @@
 """One run of the study: a simulated log, its estimate, and squared errors over variances."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.geodesy import curvature_radii_m
 from groundstation.simulation.imu.flight import ImuFlight, simulate_imu

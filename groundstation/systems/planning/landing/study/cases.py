@@ -3,9 +3,10 @@
 Source: O. N. Skrypnik, thesis on navigation between aircraft, 2010, chapters 5 and 6.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.landing_categories import CATEGORIES
 from groundstation.systems.planning.landing.plan import LANDING_PLAN
 from groundstation.systems.planning.landing.scenario import OwnErrors, RangeApproach, RangeNoise

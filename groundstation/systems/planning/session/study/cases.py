@@ -4,8 +4,9 @@ Source: O. N. Skrypnik, thesis on navigation between aircraft, 2010, chapters 5 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.results.arrays.typed import found_in
 from groundstation.systems.planning.session.analysis import SESSION_PLAN
 from groundstation.systems.planning.session.answer import UNCONTROLLED, ControlPlan

@@ -5,11 +5,10 @@ ranges are those of the true places, and the filter takes the directions at its 
 what the linear covariance of a plan leaves out.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.dataclasses import dataclass
 from groundstation.systems.planning.session.accuracy import CLOCK, EAST, NORTH, AccuracyModel
 from groundstation.systems.planning.session.laws import PlannedSession
 from groundstation.systems.planning.session.motion import Paths
