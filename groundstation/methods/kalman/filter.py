@@ -384,28 +384,3 @@ def forecast(
         transition.dynamics, steps, moved, before, every, x, np.empty_like(x), np.empty(x.shape[1:]), built_up
     )
     return built_up
-
-
-def forecast_variances(transition: Transition, step: Int64Array, starts: FloatArray, every: int) -> FloatArray:
-    """Carry the covariances of many starts forward without measurements, and return their variances.
-
-    Parameters
-    ----------
-    transition : Transition
-    step : ndarray of int, shape (s, k)
-        Which of the transition's steps each step of a start is.
-    starts : ndarray, shape (s, n, n)
-    every : int
-        Steps between two leads.
-
-    Returns
-    -------
-    ndarray, shape (s, k // every, n)
-    """
-    from groundstation.methods.kalman import runs
-
-    size, leads = transition.size, step.shape[1] // every
-    out, p = np.empty((len(step), leads, size)), np.array(starts, dtype=np.float64, order="C")
-    steps = frozen(np.ascontiguousarray(step, dtype=np.int64))
-    runs.run_variances(transition.states, transition.dynamics, steps, every, p, np.empty((size, size)), out)
-    return out

@@ -268,33 +268,3 @@ def run_forecast(
             for c in range(channels):
                 for s in range(count):
                     built_up[(k + 1) // every - 1, c, s] = x[driven, c, s]
-
-
-@in_place
-def run_variances(
-    states: States, dynamics: Dynamics, step: Int64Array, every: int, p: FloatArray, w: FloatArray, out: FloatArray
-) -> None:
-    """Carry the covariances of many starts forward, and record their variances.
-
-    Parameters
-    ----------
-    step : ndarray of int, shape (s, k)
-        Number of the distinct step that each step of a start is; k = ``every`` times the leads.
-    p : ndarray, shape (s, n, n)
-        Covariance at each start, changed in place.
-    w : ndarray, shape (n, n)
-        Room.
-    out : ndarray, shape (s, leads, n)
-        Filled: variances after every ``every`` steps.
-    """
-    pattern, F, noise_rows, noise_columns, before, after = dynamics
-    for s in range(len(p)):
-        for k in range(step.shape[1]):
-            if len(before) > 0:
-                add_noise(states, noise_rows, noise_columns, before, step[s, k], p[s])
-            predict_covariance(states, pattern, F, step[s, k], p[s], w)
-            if len(after) > 0:
-                add_noise(states, noise_rows, noise_columns, after, step[s, k], p[s])
-            if (k + 1) % every == 0:
-                for i in range(len(states)):
-                    out[s, (k + 1) // every - 1, i] = p[s, i, i]
