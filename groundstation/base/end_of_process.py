@@ -14,9 +14,9 @@ from contextlib import contextmanager
 
 @contextmanager
 def ending_at_once() -> Iterator[None]:
-    """End the process as soon as the block has raised SystemExit and all that others asked for at the end is done.
+    """End the process as soon as the block has raised SystemExit.
 
-    A block that ends in another way leaves the end to Python; so does a process in which somebody has asked before to
+    All that others asked for at the end is done before. A block that ends in another way leaves the end to Python; so does a process in which somebody has asked before to
     be called at its end, as measurements of coverage do: they would be left out.
     """
     codes: list[int] = []
@@ -41,6 +41,9 @@ def ending_at_once() -> Iterator[None]:
 
 
 def _is_first() -> bool:
-    """Tell whether nobody has asked yet to be called at the end; a Python that does not know has somebody."""
+    """Tell whether nobody has asked yet to be called at the end.
+
+    A Python that does not know is taken to have somebody.
+    """
     asked: int = getattr(atexit, "_ncallbacks", lambda: 1)()
     return asked == 0
