@@ -16,8 +16,9 @@ from contextlib import contextmanager
 def ending_at_once() -> Iterator[None]:
     """End the process as soon as the block has raised SystemExit.
 
-    All that others asked for at the end is done before. A block that ends in another way leaves the end to Python; so does a process in which somebody has asked before to
-    be called at its end, as measurements of coverage do: they would be left out.
+    All that others asked for at the end is done before. A block that ends in another way leaves the end to Python. So
+    does a process in which somebody has asked before to be called at its end, as measurements of coverage do: they
+    would be left out.
     """
     codes: list[int] = []
 
