@@ -1,5 +1,6 @@
 """A run that is continued: what is finished is not done again, and the results are those of one run from scratch."""
 
+import errno
 import json
 import multiprocessing
 import os
@@ -25,9 +26,10 @@ from groundstation.pipeline.many_flights.processes import workers
 from groundstation.pipeline.many_flights.processes.crew import in_turn
 from groundstation.pipeline.many_flights.processes.crews import crew_for
 from groundstation.pipeline.many_flights.processes.workers import TASKS_PER_PROCESS, _teller, side_by_side
+from groundstation.pipeline.many_flights.runs import out_folder
 from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.many_flights.runs.dry_run import plan_many
-from groundstation.pipeline.many_flights.runs.out_folder import LOCK
+from groundstation.pipeline.many_flights.runs.out_folder import LOCK, alone_in
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job
 from groundstation.pipeline.one_flight.outcome import Outcome
@@ -302,6 +304,33 @@ def test_an_event_of_a_worker_is_one_write_to_a_pipe() -> None:
 def test_two_runs_do_not_write_into_one_folder(finished: Path) -> None:
     with FileLock(finished / LOCK), pytest.raises(UsageError, match="another run is writing"):
         run_many([SHORT], finished, Configuration())
+
+
+def test_a_folder_has_one_run_at_a_time(tmp_path: Path) -> None:
+    with alone_in(tmp_path), pytest.raises(UsageError, match="another run is writing"), alone_in(tmp_path):
+        pass
+    with alone_in(tmp_path):
+        pass
+
+
+@pytest.mark.filterwarnings("ignore:flock not supported")  # filelock tells whom it concerns
+def test_a_run_goes_on_where_the_file_system_knows_no_lock(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_number: int, _how: int) -> None:
+        raise OSError(errno.ENOSYS, "no flock")
+
+    monkeypatch.setattr(out_folder.fcntl, "flock", refuse)
+    with alone_in(tmp_path):
+        pass
+
+
+def test_a_run_alone_in_its_folder_calls_no_python_at_each_file_that_is_opened(tmp_path: Path) -> None:
+    code = (
+        "import sys; from pathlib import Path;"
+        "from groundstation.pipeline.many_flights.runs.out_folder import alone_in;"
+        f"alone_in(Path({str(tmp_path)!r})).__enter__(); print('filelock' in sys.modules, 'asyncio' in sys.modules)"
+    )
+    told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    assert told.split() == ["False", "False"]
 
 
 def die_or_run(job: Job, listen: Listener) -> Outcome:

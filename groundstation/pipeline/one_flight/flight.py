@@ -17,6 +17,7 @@ from groundstation.base.findings import SEVERITIES, Finding, worst
 from groundstation.base.records import RecordBatch
 from groundstation.base.to_disk import sync_folder
 from groundstation.base.words import counted
+from groundstation.pipeline.one_flight.ahead import imported_meanwhile
 from groundstation.pipeline.one_flight.analyse import Given, analyse
 from groundstation.pipeline.one_flight.apply import apply_step, corrected_name, write_derived
 from groundstation.pipeline.one_flight.convert import Converted, convert_flight, parts_told
@@ -153,17 +154,18 @@ def _run(log: Log, version: Version, job: Job, partial: Path, watch: Stopwatch) 
     from groundstation.results.files import put_failures, save
 
     mcap = partial / "flight.mcap"
-    converted: Converted | tuple[Log, ...]
-    if job.step == "analysis" and job.finished is not None:
-        converted = _taken_over(job.finished, mcap)
-    else:
-        with watch.stage("converting"):
-            converted = convert_flight(log, mcap, job.configuration.thresholds, job.configuration.references)
-        _require_unchanged(log, version)
-    if isinstance(converted, tuple):
-        return converted
-    with watch.stage("reading the MCAP"):
-        flight = read_flight(mcap, converted)
+    with imported_meanwhile(with_pages=not job.only_results):
+        converted: Converted | tuple[Log, ...]
+        if job.step == "analysis" and job.finished is not None:
+            converted = _taken_over(job.finished, mcap)
+        else:
+            with watch.stage("converting"):
+                converted = convert_flight(log, mcap, job.configuration.thresholds, job.configuration.references)
+            _require_unchanged(log, version)
+        if isinstance(converted, tuple):
+            return converted
+        with watch.stage("reading the MCAP"):
+            flight = read_flight(mcap, converted)
     start_utc_ns = flight.start_ns if flight.has_utc else None
     path = job.url or str(log.path.absolute())
     power_up, parts = _power_up(log, job), _parts(log, job, path, converted, flight)
