@@ -26,6 +26,7 @@ from groundstation.store.info import StoreInfo
 from groundstation.store.reader import read_info
 from groundstation.store.writer import StoreWriter
 from groundstation.systems import systems
+from groundstation.systems.known import no_runways
 from groundstation.tables.headings import true_heading
 from groundstation.tables.table import Flight
 from tests.real_logs import real_log
@@ -65,7 +66,7 @@ def answer(flight: Flight, name: str) -> Answer:
     configuration = Configuration({"heading": {"runs": "all_ground"}})  # a recorded log taxies straight after landing
     seen = seen_by_analyses(flight, configuration)
     (analysis,) = (one for one in systems().analyses if one.name == name)
-    known = replace(known_of(seen, configuration), runways=None)  # where the disguise puts a flight there is none
+    known = replace(known_of(seen, configuration), find_runways=no_runways)  # where the disguise puts it there is none
     found = run_analyses((analysis,), seen, known)
     assert name in found.answers, found.reasons
     answered: Answer = found.answers[name]

@@ -13,15 +13,16 @@ from groundstation.integrity.limits import shipped
 from groundstation.pipeline.one_flight.analyse import known_of, run_analyses, seen_by_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.log import open_log
+from groundstation.pipeline.verbs import usable
 from groundstation.pipeline.verbs.check import checked_with_flight
 from groundstation.pipeline.verbs.usable import (
-    FLIGHT_PURPOSES,
-    SESSION_PURPOSES,
     Usability,
+    flight_purposes,
+    session_purposes,
     usability_of_flight,
     usability_of_session,
 )
-from groundstation.systems import systems
+from groundstation.systems import systems, systems_for
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.gates_answer import GATES
 from groundstation.systems.heading.wording import told
@@ -53,7 +54,7 @@ def agreeing(purpose: str, flight: Flight) -> tuple[Usability, object]:
     """What is told of a flight, and the answer of its analysis: none, and for the reason told, or some."""
     usability = usability_of_flight(purpose, flight, ORDINARY)
     seen = seen_by_analyses(flight, ORDINARY)
-    found = run_analyses((FLIGHT_PURPOSES[purpose],), seen, known_of(seen, ORDINARY))
+    found = run_analyses((flight_purposes()[purpose],), seen, known_of(seen, ORDINARY))
     assert (usability.state == "no") == (purpose not in found.answers)
     if usability.state == "no":
         assert usability.shortfalls[0].text.startswith(found.reasons[purpose])
@@ -61,7 +62,7 @@ def agreeing(purpose: str, flight: Flight) -> tuple[Usability, object]:
 
 
 def test_the_page_and_a_wrong_name_tell_every_purpose() -> None:
-    purposes = [*FLIGHT_PURPOSES, *SESSION_PURPOSES]
+    purposes = [*flight_purposes(), *session_purposes()]
     assert {one.name for one in (*systems().analyses, *systems().session_analyses)} == set(purposes), "as list names"
     page = Path(__file__).parents[1] / "docs" / "integrity.md"
     assert "`--for NAME`" in page.read_text(encoding="utf-8")
@@ -193,10 +194,27 @@ def test_every_analysis_that_list_names_is_told_as_it_runs() -> None:
     assert "no truth" in usability_of_flight("reference", seen, ORDINARY).text
 
 
+@pytest.mark.parametrize("sample", ["taxi-good.csv", "taxi-short.csv"])
+def test_a_system_loaded_alone_says_the_same_as_among_all(sample: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    flight = read(SAMPLES / sample)
+    examined = [one.name for one in systems().analyses if one.examine is not None]
+    alone = {name: usability_of_flight(name, flight, ORDINARY) for name in examined}
+    assert [name for name in examined if len(systems_for(name).every) == 1] == [
+        name for name in examined if name != "magnetic_flux"
+    ]
+    monkeypatch.setattr(usable, "systems_for", lambda _name: systems())
+    assert alone == {name: usability_of_flight(name, flight, ORDINARY) for name in examined}
+
+
+def test_no_two_systems_offer_the_same_role() -> None:
+    offered = [role for one in systems().analyses for role in one.offers]
+    assert len(offered) == len(set(offered))
+
+
 def test_a_purpose_that_is_none_is_a_usage_error() -> None:
     code, _, error = groundstation("check", SAMPLES / "taxi-good.csv", "--for", "cooking")
     assert code == 2
-    assert ", ".join((*FLIGHT_PURPOSES, *SESSION_PURPOSES)) in error
+    assert ", ".join((*flight_purposes(), *session_purposes())) in error
 
 
 def test_a_recorded_flight_is_told_as_it_runs() -> None:

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from groundstation.base import arrow_compute as pc
 from groundstation.base.records import BoolArray
 
 _FLOATS = {"float": "float32", "double": "float64"}  # to numpy "float" is one of 64 bits

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.dataclasses import dataclass
+from groundstation.base.installed import installed_version
 from groundstation.base.own_files import read_own, write_own
 
 INTEGER, NUMBER = "integer", "number"
@@ -136,12 +137,10 @@ def digest_of(function: Callable[..., Any], forms: Sequence[Form]) -> bytes:
 
     That is its code and constants, and those of all that it calls.
     """
-    from importlib.metadata import version
-
     from llvmlite import __version__, binding
 
     told = hashlib.sha256(
-        repr((LAYOUT, forms, entry_source(function, forms)[0], version("numba"), __version__)).encode()
+        repr((LAYOUT, forms, entry_source(function, forms)[0], installed_version("numba"), __version__)).encode()
     )
     told.update(f"{binding.get_host_cpu_name()} {binding.get_host_cpu_features().flatten()}".encode())
     told.update(binding.get_process_triple().encode())

@@ -4,7 +4,6 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -55,11 +54,14 @@ def _told_in(folder: str) -> Iterator[str]:
         return
     for package in packages:
         try:
-            yield Path(package, "entry_points.txt").read_text(encoding="utf-8")
+            # in a Python with 200 packages a Path for each takes longer than reading
+            with open(f"{package}/entry_points.txt", "rb") as file:  # noqa: PTH123
+                told = file.read().decode()
         except (FileNotFoundError, NotADirectoryError):
             continue
         except (OSError, UnicodeDecodeError):
-            yield _DOUBT
+            told = _DOUBT
+        yield told
 
 
 def _names_others(text: str) -> bool:

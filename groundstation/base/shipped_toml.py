@@ -3,7 +3,7 @@
 A user's own files are chosen by path.
 """
 
-from importlib import resources
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +16,13 @@ SUFFIX = ".toml"
 
 @dataclass(frozen=True)
 class TomlFile:
-    """TOML file: name without suffix, its name in errors, its table and its text."""
+    """TOML file: name without suffix, its name in errors, its table and its text, and whether it came with us."""
 
     name: str
     where: str
     table: dict[str, Any]
     text: str
+    is_shipped: bool = False
 
 
 @dataclass(frozen=True)
@@ -40,10 +41,13 @@ class ShippedToml:
     folder: str
     what: str
 
+    @property
+    def _place(self) -> Path:
+        return Path(import_module(self.package).__path__[0], self.folder)
+
     def names(self) -> tuple[str, ...]:
         """Names of the shipped files, in alphabetical order."""
-        entries = (resources.files(self.package) / self.folder).iterdir()
-        return tuple(sorted(Path(entry.name).stem for entry in entries if entry.name.endswith(SUFFIX)))
+        return tuple(sorted(path.stem for path in self._place.glob(f"*{SUFFIX}")))
 
     def read(self, name_or_path: str | Path) -> TomlFile:
         """Read a shipped file by name (any case), or a user's file by its path.
@@ -56,14 +60,15 @@ class ShippedToml:
             For an unknown name, and for a file that cannot be read or is not TOML.
         """
         wanted = str(name_or_path)
-        if wanted.endswith(SUFFIX):
+        is_shipped = not wanted.endswith(SUFFIX)
+        if not is_shipped:
             path = Path(name_or_path)
             where, name = path.name, path.stem
             text = toml_text(path, where, f"a TOML file for {self.what}")
         elif wanted.lower() in self.names():
             name = wanted.lower()
             where = f"{name}{SUFFIX}"
-            text = (resources.files(self.package) / self.folder / where).read_text(encoding="utf-8")
+            text = (self._place / where).read_text(encoding="utf-8")
         else:
             raise SettingsError(self.what, repr(wanted), f"a file *{SUFFIX} or one of {', '.join(self.names())}")
-        return TomlFile(name, where, toml_table(text, where, f"a TOML file for {self.what}"), text)
+        return TomlFile(name, where, toml_table(text, where, f"a TOML file for {self.what}"), text, is_shipped)

@@ -7,7 +7,6 @@ is written, a loss of power in between leaves it empty under its name.
 import errno
 import os
 from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
@@ -52,6 +51,8 @@ def sync_files(paths: Iterable[Path]) -> None:
         for path in listed:
             sync_file(path)
         return
+    from concurrent.futures import ThreadPoolExecutor  # with logging, 5 ms that a verb without files is spared
+
     with ThreadPoolExecutor(SIDE_BY_SIDE, "disk") as threads:
         for _ in threads.map(sync_file, listed):
             pass

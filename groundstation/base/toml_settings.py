@@ -124,8 +124,13 @@ def trusted(cls: type[Settings], table: Mapping[str, Any]) -> Settings:
     >>> trusted(Wind, {"north_mps": 3, "levels_m": [10.0]})
     Wind(north_mps=3.0, levels_m=(10.0,))
     """
-    hints = typing.get_type_hints(cls)
+    hints = _hints(cls)  # type: ignore[arg-type]  # a class can be hashed
     return cls(**{name: _trusted(hints[name], value) for name, value in table.items()})
+
+
+@cache
+def _hints(cls: type[Any]) -> dict[str, Any]:
+    return typing.get_type_hints(cls)
 
 
 def _trusted(kind: Any, value: Any) -> Any:
@@ -133,7 +138,8 @@ def _trusted(kind: Any, value: Any) -> Any:
         return trusted(typing.cast("type[Any]", kind), value)
     if isinstance(value, list):
         return tuple(_trusted(typing.get_args(kind)[0], one) for one in value)
-    return float(value) if kind is float else value
+    is_number = isinstance(value, int) and float in (kind, *typing.get_args(kind))
+    return float(value) if is_number else value
 
 
 @cache

@@ -96,17 +96,28 @@ class ClockModel:
         for name in ("starts", "offsets_ns", "placed_index", "placed_ns", "stray_index"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
-    def time_ns(self, record_index: Int64Array, device_time_ns: Column) -> Int64Array:
+    def is_shift(self, first: int, last: int) -> bool:
+        """Tell whether corrected time is device time and the one offset of all, for records of such places."""
+        if len(self.starts) > 1:
+            return False
+        low, high = self.placed_index.searchsorted((first, last + 1))
+        return bool(low == high)
+
+    def time_ns(self, record_index: Int64Array, device_time_ns: Column, out: Int64Array | None = None) -> Int64Array:
         """Corrected time, nanoseconds, shape (n,), of records given by place and device time.
 
-        Records without a time of their own must be among those the survey saw.
+        Records without a time of their own must be among those the survey saw. ``out`` is an array to write it to.
         """
-        time = device_time_ns.values + self._offset_ns(record_index)
+        time = np.add(device_time_ns.values, self._offset_ns(record_index), out=out)
         if not len(self.placed_index) or not len(record_index):
+            return np.asarray(time, dtype=np.int64)
+        if self.placed_index[-1] < record_index.min() or self.placed_index[0] > record_index.max():
             return np.asarray(time, dtype=np.int64)
         if (record_index[1:] <= record_index[:-1]).any():
             at = np.minimum(np.searchsorted(self.placed_index, record_index), len(self.placed_index) - 1)
-            return np.where(self.placed_index[at] == record_index, self.placed_ns[at], time)
+            is_placed = self.placed_index[at] == record_index
+            time[is_placed] = self.placed_ns[at[is_placed]]
+            return np.asarray(time, dtype=np.int64)
         low, high = np.searchsorted(self.placed_index, (record_index[0], record_index[-1] + 1))
         at = np.searchsorted(record_index, self.placed_index[low:high])  # few are placed: they are looked for
         found = record_index[at] == self.placed_index[low:high]

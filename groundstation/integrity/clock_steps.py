@@ -1,5 +1,6 @@
 """Steps of a recorder's clock, and rows out of order that are no steps."""
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -86,11 +87,25 @@ def quantile(values: Int64Array, share: float) -> float:
     >>> quantile(np.array([5, 1, 4, 2]), 0.5), quantile(np.array([5, 1, 4, 2]), 1.0)
     (3.0, 5.0)
     """
-    at = share * (len(values) - 1)
-    low = int(at)
-    places = (low, min(low + 1, len(values) - 1))
-    below, above = np.partition(values, places)[[*places]].tolist()
-    return float(below + (at - low) * (above - below))
+    return quantiles(values, (share,))[0]
+
+
+def quantiles(values: Int64Array, shares: Sequence[float]) -> list[float]:
+    """Return several quantiles of integers in any order, as :func:`quantile` does, by one selection.
+
+    Examples
+    --------
+    >>> quantiles(np.array([5, 1, 4, 2]), (0.5, 1.0))
+    [3.0, 5.0]
+    """
+    last = len(values) - 1
+    found = []
+    places = [(int(share * last), min(int(share * last) + 1, last)) for share in shares]
+    ordered = np.partition(values, sorted({place for pair in places for place in pair}))
+    for share, (low, high) in zip(shares, places, strict=True):
+        below, above = int(ordered[low]), int(ordered[high])
+        found.append(float(below + (share * last - low) * (above - below)))
+    return found
 
 
 class ClockSteps:

@@ -44,10 +44,10 @@ class _FieldTally:
 
     def add(self, column: Column, rows: Int64Array | None, record_index: Int64Array, device_ns: Int64Array) -> None:
         """Count a batch; ``rows`` are those where the column is present, None for all."""
-        values = column.values if rows is None else column.values[rows]
-        self.present += len(values)
-        if values.dtype.kind != "f":
+        self.present += len(column.values) if rows is None else len(rows)
+        if column.values.dtype.kind != "f":
             return
+        values = column.values if rows is None else column.values[rows]
         if self._may_be_odd(values):
             values, rows = self._without_odd(values, rows, record_index, device_ns)
         if self.constancy is not None:
@@ -134,7 +134,8 @@ class Contents:
                 if id(mask) not in rows_of:
                     rows_of[id(mask)] = None if mask.all() else np.flatnonzero(mask)
                 rows = rows_of[id(mask)]
-            self._field(tally, batch.topic, name).add(column, rows, batch.record_index, device_ns)
+            found = tally.fields.get(name) or self._new_field(tally, batch.topic, name)
+            found.add(column, rows, batch.record_index, device_ns)
         if tally.counters is None:
             tally.counters = counters_of(batch, self._thresholds.sequence)
         for name, counter in tally.counters.items():
@@ -153,13 +154,11 @@ class Contents:
         if batch.topic == DROPOUTS and DROPOUT_LENGTH in batch.columns:
             self._add_dropouts(batch.columns[DROPOUT_LENGTH], batch.record_index, device_ns)
 
-    def _field(self, tally: _TopicTally, topic: str, name: str) -> _FieldTally:
-        found = tally.fields.get(name)
-        if found is None:
-            known = self._thresholds.range_of(topic, name)
-            low, high = known or (float("-inf"), float("inf"))
-            constancy = watch(topic, name, self._thresholds.stuck)
-            found = tally.fields[name] = _FieldTally(low, high, known is not None, constancy)
+    def _new_field(self, tally: _TopicTally, topic: str, name: str) -> _FieldTally:
+        known = self._thresholds.range_of(topic, name)
+        low, high = known or (float("-inf"), float("inf"))
+        constancy = watch(topic, name, self._thresholds.stuck)
+        found = tally.fields[name] = _FieldTally(low, high, known is not None, constancy)
         return found
 
     def _sample(self, batch: RecordBatch, device_ns: Int64Array) -> None:

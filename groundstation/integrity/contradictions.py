@@ -67,11 +67,12 @@ class _Series:
     def has(self, *names: str) -> bool:
         return all(name in self.columns and bool(np.isfinite(self.columns[name]).any()) for name in names)
 
-    def known(self, *names: str) -> "_Series":
-        """Return the samples in which all of these fields are known, one for each time."""
+    def known(self, *names: str, beside: tuple[str, ...] = ()) -> "_Series":
+        """Return the samples in which all of these fields are known, one for each time, with others ``beside``."""
         mask = np.all([np.isfinite(self.columns[name]) for name in names], axis=0)
         mask &= np.concatenate([[True], np.diff(self.time_s) > 0.0]) if len(self.time_s) else mask
-        return _Series(self.topic, self.time_s[mask], {name: values[mask] for name, values in self.columns.items()})
+        kept = {name: self.columns[name][mask] for name in (*names, *beside) if name in self.columns}
+        return _Series(self.topic, self.time_s[mask], kept)
 
 
 @dataclass(frozen=True)
@@ -198,7 +199,7 @@ def _side(one: _Series, windows: Mapping[str, _Windows], zero_ns: int) -> Contra
     """Find the roll of a vehicle on its side while it moves."""
     if not one.has("roll_deg"):
         return None
-    known = one.known("roll_deg")
+    known = one.known("roll_deg", beside=("pitch_deg",))
     roll, time_s = known.columns["roll_deg"], known.time_s
     pitch = known.columns.get("pitch_deg", np.zeros(len(roll)))
     is_side = (np.abs(roll) > SIDE_DEG) & ~(np.abs(pitch) > STEEP_DEG) & (_speed_at(time_s, windows) > MOVES_MPS)

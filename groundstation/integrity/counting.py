@@ -16,6 +16,8 @@ from groundstation.base.toml_settings import number
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import ClockModel, interpolated, start_of, zero_of
 from groundstation.integrity.clock_steps import middle_of
+from groundstation.integrity.thinning import Measured, Thinner
+from groundstation.integrity.time_passes import passes_over, starts_of_runs
 
 FROZEN_SHARE, FROZEN_LEAST_RECORDS = 0.9, 10
 
@@ -84,59 +86,75 @@ def estimate_counting_clock(
     usable = has_time & ~frozen
     if not usable.any():
         usable, frozen = has_time, np.zeros(len(has_time), dtype=bool)
+    tolerance_ns = round(settings.tolerance_s * NS_PER_S)
     index, time = record_index[usable], device_time_ns.values[usable]
     if not len(time):
         return ClockModel(missing_times=len(record_index))
-    tolerance_ns = round(settings.tolerance_s * NS_PER_S)
     judged = _judged(time, tolerance_ns, settings.run_records)
-    doubted = judged.stale | judged.ahead
     is_wanted = ~usable
-    if doubted.any():
-        is_wanted[np.flatnonzero(usable)[doubted]] = True
-        index, time = index[~doubted], time[~doubted]
+    if len(judged.rows):
+        believed = np.ones(len(time), dtype=bool)
+        believed[judged.rows] = False
+        is_wanted[np.flatnonzero(usable)[judged.rows]] = True
+        index, time = index[believed], time[believed]
     wanted = np.flatnonzero(is_wanted)
     placed = interpolated(record_index[wanted], index, time, 0.0)
     fits = (frozen & has_time)[wanted] & (np.abs(device_time_ns.values[wanted] - placed) <= tolerance_ns)
     frozen_stale = int((frozen & has_time).sum() - fits.sum())
     wanted, placed = record_index[wanted[~fits]], placed[~fits]
-    zero = zero_of(int(time.min()), int(time.max()), utc_of_zero_ns)
-    late = np.maximum.accumulate(time) - time > tolerance_ns
-    steps = np.diff(time)
+    told = _measured(time, tolerance_ns, settings.run_records)
+    zero = zero_of(told.earliest_ns, told.latest_ns, utc_of_zero_ns)
+    late = index[:0]
+    if told.lateness_ns > tolerance_ns:
+        late = index[np.maximum.accumulate(time) - time > tolerance_ns]
     return ClockModel(
         is_absolute=zero.is_absolute,
-        period_ns=int(middle_of(steps[steps > 0])),
-        starts=record_index[:1],
+        period_ns=told.period_ns,
+        starts=record_index[:1].copy(),
         offsets_ns=np.array([zero.ns], dtype=np.int64),
         placed_index=wanted,
         placed_ns=placed + zero.ns,
         missing_times=int((~has_time).sum()),
-        implausible_times=int(judged.ahead.sum()),
-        stale_times=int(judged.stale.sum()) + frozen_stale,
-        stray_rows=int(np.count_nonzero(late)),
-        stray_index=index[late],
-        is_unordered=bool(late.any()),
+        implausible_times=judged.ahead,
+        stale_times=judged.stale + frozen_stale,
+        stray_rows=len(late),
+        stray_index=late.copy(),
+        is_unordered=bool(len(late)),
         shift_ns=0 if zero.is_absolute else zero.ns,
         has_times=True,
         is_counting=True,
         start=start_of(int(time[0]), utc_of_zero_ns),
         first_device_ns=int(time[0]) + (utc_of_zero_ns or 0),
-        longest_step_ns=int(steps.max(initial=0)),
+        longest_step_ns=told.longest_step_ns,
     )
 
 
+def _measured(time: Int64Array, tolerance_ns: int, run_records: int) -> Measured:
+    """Return the figures of records that are believed."""
+    if passes_over(time):
+        return Thinner(tolerance_ns, run_records).measured(time)
+    steps = np.diff(time)
+    lateness_ns = int((np.maximum.accumulate(time) - time).max())
+    period_ns = int(middle_of(steps[steps > 0]))
+    return Measured(int(time.min()), int(time.max()), lateness_ns, int(steps.max(initial=0)), period_ns)
+
+
 class _Judged(NamedTuple):
-    stale: BoolArray
-    ahead: BoolArray
+    """Rows of doubted records, and how many of them are stale, and how many ahead."""
+
+    rows: Int64Array
+    stale: int
+    ahead: int
 
 
 def _judged(time: Int64Array, tolerance_ns: int, run_records: int) -> _Judged:
-    """Return masks of records earlier, and later, than the runs around them allow, shape (n,).
+    """Return the records earlier, and later, than the runs around them allow.
 
     A run is a stretch of records each within the tolerance of the one before. Long runs are believed; a short one is
     believed when it lies between the end of the long run before it and the start of the one after, both widened by the
     tolerance.
     """
-    starts = np.concatenate(([0], np.flatnonzero(np.abs(np.diff(time)) > tolerance_ns) + 1))
+    starts = starts_of_runs(time, tolerance_ns)
     lengths = np.diff(starts, append=len(time))
     is_long = lengths >= min(run_records, int(lengths.max()))
     long = np.flatnonzero(is_long)
@@ -148,4 +166,6 @@ def _judged(time: Int64Array, tolerance_ns: int, run_records: int) -> _Judged:
     after_ns = np.where(after < len(long), after_ns, before_ns)
     stale = ~is_long & (first < np.minimum(before_ns, after_ns) - tolerance_ns)
     ahead = ~is_long & (last > np.maximum(before_ns, after_ns) + tolerance_ns) & ~stale
-    return _Judged(np.repeat(stale, lengths), np.repeat(ahead, lengths))
+    doubted = stale | ahead
+    rows = np.flatnonzero(np.repeat(doubted, lengths)) if doubted.any() else np.zeros(0, dtype=np.int64)
+    return _Judged(rows, int(lengths[stale].sum()), int(lengths[ahead].sum()))

@@ -337,8 +337,7 @@ def topic_ledger(
 
     There is at least one time.
     """
-    span_ns = int(rhythm.steps_ns.sum())
-    ahead = rhythm.ahead
+    span_ns, ahead = rhythm.span_ns, rhythm.ahead
     return TopicCounts(
         topic,
         rows=len(time_ns),

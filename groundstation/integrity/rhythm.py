@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
+from functools import cached_property
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from groundstation.base.gaps import Gaps, Pause, logged_ns
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import is_canonical
 from groundstation.base.units import NS_PER_S
-from groundstation.integrity.clock_steps import quantile
+from groundstation.integrity.clock_steps import quantiles
 from groundstation.integrity.limits import GapLimits, RhythmLimits, Thresholds
 
 MOST_STEPS = 10_000  # steps from which a typical step is taken
@@ -48,17 +49,27 @@ class Rhythm:
     pauses: tuple[Pause, ...] = ()
     paused: tuple[int, ...] = ()
 
+    @cached_property
+    def span_ns(self) -> int:
+        """Time of all steps together."""
+        return int(self.steps_ns.sum())
+
+    @cached_property
+    def most_ns(self) -> int:
+        """Longest of all steps; 0 without any."""
+        return int(self.steps_ns.max(initial=0))
+
     @property
     def coverage(self) -> float:
         """Share of the samples expected at the usual step that are there, at most 1."""
-        expected = int(self.steps_ns.sum()) / self.period_ns + 1.0
+        expected = self.span_ns / self.period_ns + 1.0
         return min(1.0, (self.ahead + 1) / expected)
 
     @property
     def jitter_s(self) -> float:
         """Root mean square of the steps less the period, without gaps."""
-        inside = np.delete(self.steps_ns, self.paused)
-        inside = inside[inside <= self.longest_ns]
+        inside = np.delete(self.steps_ns, self.paused) if self.paused else self.steps_ns
+        inside = inside[inside <= self.longest_ns] if self.most_ns > self.longest_ns else inside
         return float(np.sqrt(np.mean(np.square(inside - self.period_ns)))) / NS_PER_S if len(inside) else 0.0
 
     @property
@@ -83,6 +94,8 @@ class Rhythm:
         if ends:
             time_ns = np.sort(np.concatenate((time_ns, np.array(ends, dtype=np.int64))), kind="stable")
             steps_ns = np.diff(logged_ns(time_ns, self.pauses))
+        elif self.most_ns <= least_ns:
+            return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)  # a view would hold all times
         before = np.flatnonzero(steps_ns > least_ns)
         return time_ns[before], time_ns[before + 1]
 
@@ -96,15 +109,15 @@ def rhythm_of(topic: str, time_ns: Int64Array, thresholds: Thresholds, pauses: S
     mean step, but no nominal rate. Time within ``pauses`` of the log is no time of the topic.
     """
     limits, steps = thresholds.rhythm, _steps_ns(time_ns, pauses)
-    ahead = steps[steps > 0]
+    ahead = steps if steps.min(initial=1) > 0 else steps[steps > 0]
     if not len(ahead):
         return Rhythm(steps, 0, 0.0, False, False, thresholds.gaps)
     some = ahead[:: len(ahead) // MOST_STEPS | 1]  # odd: two steps in turn are both met
-    usual_ns = quantile(some, 0.5)
+    usual_ns, long_ns = quantiles(some, (0.5, 0.8))
     rows = (int(np.searchsorted(time_ns, one.start_ns, "right")) - 1 for one in pauses)
     paused = tuple(row for row in rows if 0 <= row < len(steps))
     found = Rhythm(steps, len(ahead), usual_ns, True, True, thresholds.gaps, tuple(pauses), paused)
-    if _is_sporadic(topic, found, quantile(some, 0.8), limits):
+    if _is_sporadic(topic, found, long_ns, limits):
         return replace(found, has_rate=False, has_gaps=False)
     if _is_unexplained(found, limits):
         mean_ns = int(steps.sum()) / len(ahead)
@@ -130,9 +143,9 @@ def _is_sporadic(topic: str, rhythm: Rhythm, long_ns: float, limits: RhythmLimit
         return False
     if rhythm.ahead < limits.fewest_steps or long_ns > limits.uneven * rhythm.period_ns:
         return True
-    is_gap = rhythm.steps_ns > _longest_ns(rhythm.period_ns, rhythm.limits)
-    gaps = int(np.count_nonzero(is_gap))
-    if int(rhythm.steps_ns[~is_gap].sum()) < limits.burst_s * NS_PER_S * (gaps + 1):
+    long = rhythm.steps_ns[rhythm.steps_ns > rhythm.longest_ns]
+    gaps = len(long)
+    if rhythm.span_ns - int(long.sum()) < limits.burst_s * NS_PER_S * (gaps + 1):
         return True  # lists and definitions, written at one moment: the step in a burst is no period
     is_thin = rhythm.coverage < limits.burst_coverage
     return is_thin and gaps > 0 and (rhythm.ahead + 1) / (gaps + 1) < limits.burst_rows

@@ -3,6 +3,7 @@
 They are found batch by batch.
 """
 
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -123,13 +124,20 @@ class Constancy:
         """
         return self._step or self._smallest
 
-    def stretches(self) -> list[ConstantStretch]:
-        """Return the long stretches, in the order of the log."""
+    def stretches(self, times_usual: float = 0.0) -> list[ConstantStretch]:
+        """Return the long stretches, in the order of the log.
+
+        Each has at least so many times the samples of the others (:meth:`usual_samples`).
+        """
         self._keep(self._open)
         self._open = self._open[:0]
-        kept = np.concatenate((self._open, *self._kept))
-        kept = kept[np.argsort(kept["first_index"], kind="stable")]
-        return [ConstantStretch(RecordPlace(*row[:2]), RecordPlace(*row[2:4]), *row[4:]) for row in kept.tolist()]
+        found = []
+        for kept in self._kept:
+            samples = kept["samples"]
+            others = (self.samples - samples) / self.changes if self.changes else np.full(len(kept), np.inf)
+            found += kept[samples >= times_usual * others].tolist() if times_usual else kept.tolist()
+        found.sort(key=itemgetter(0))
+        return [ConstantStretch(RecordPlace(*row[:2]), RecordPlace(*row[2:4]), *row[4:]) for row in found]
 
     def usual_samples(self, without: ConstantStretch) -> float:
         """Mean length of all other stretches; infinite when there is none."""

@@ -156,11 +156,10 @@ class Judge:
     def _long(self, name: str, constancy: Constancy) -> Iterator[ConstantStretch]:
         """Return the stretches that last, of a field that is not constant through the whole log."""
         times = self._limits.noise_times_usual if name in _NOISY else self._limits.times_usual
-        for stretch in constancy.stretches() if constancy.changes else ():
-            is_long = stretch.samples >= times * constancy.usual_samples(without=stretch)
+        for stretch in constancy.stretches(times) if constancy.changes else ():
             by_device_ns = stretch.last.device_ns - stretch.first.device_ns  # the clock is asked where it matters
             is_short = 0 <= by_device_ns < self._limits.min_s * NS_PER_S
-            if is_long and not is_short and self._seconds(stretch) >= self._limits.min_s:
+            if not is_short and self._seconds(stretch) >= self._limits.min_s:
                 yield stretch
 
     def _seconds(self, stretch: ConstantStretch) -> float:

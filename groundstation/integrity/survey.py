@@ -1,7 +1,7 @@
 """One pass over a log: its header, clock model and ledger.
 
 Kept are places and times, 16 bytes a record, for each set of topics that are sampled together; when there are more than
-16 MiB of them, all go to a temporary file, 12 bytes a record; times of validity take 8 bytes more. Rates and gaps are
+64 MiB of them, all go to a temporary file, 12 bytes a record; times of validity take 8 bytes more. Rates and gaps are
 those of the times at which values were valid.
 """
 
@@ -84,22 +84,26 @@ def _order_of(places: Places, pieces: Sequence[PieceOnDisk], clock: ClockModel) 
     time_ns = np.empty(sum(kept.count for kept in pieces), dtype=np.int64)
     valid_ns = np.empty_like(time_ns) if any(kept.has_validity for kept in pieces) else time_ns
     at = backward = stray = 0
-    before = np.zeros(0, dtype=np.int64)
+    before_ns: int | None = None
     for kept in pieces:
         piece = places.piece(kept)
         rows = slice(at, at + kept.count)
-        time_ns[rows] = clock.time_ns(piece.index, piece.time)
+        clock.time_ns(piece.index, piece.time, out=time_ns[rows])
         if valid_ns is not time_ns:
             own_ns = piece.time.values if piece.validity_ns is None else piece.validity_ns
             valid_ns[rows] = clock.valid_ns(piece.index, piece.time, own_ns, time_ns[rows])
-        timed = np.concatenate((before, piece.timed))
+        timed = piece.timed
         backward += int(np.count_nonzero(timed[1:] < timed[:-1]))
+        if kept.times:
+            backward += before_ns is not None and kept.times[0] < before_ns
+            before_ns = kept.times[1]
         stray += int(np.isin(piece.index, clock.stray_index).sum()) if len(clock.stray_index) else 0
-        at, before = at + kept.count, timed[-1:]
+        at += kept.count
     lateness = 0
-    if (time_ns[1:] < time_ns[:-1]).any():
+    is_rising = not backward and all(kept.is_timed and clock.is_shift(kept.first, kept.last) for kept in pieces)
+    if not is_rising and (time_ns[1:] < time_ns[:-1]).any():
         lateness = int((np.maximum.accumulate(time_ns) - time_ns).max())
-    if (valid_ns[1:] < valid_ns[:-1]).any():
+    if not (is_rising and valid_ns is time_ns) and (valid_ns[1:] < valid_ns[:-1]).any():
         valid_ns.sort(kind="stable")
     return _Order(valid_ns, lateness, backward, stray)
 

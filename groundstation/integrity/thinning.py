@@ -6,9 +6,34 @@ the ends of runs and as much of each run as makes it a long one, late ones, and 
 or leaves a stretch of half the tolerance, so that runs hold together.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from groundstation.base.records import BoolArray, Int64Array
+from groundstation.integrity.time_passes import (
+    EARLIEST,
+    LATENESS,
+    LATEST,
+    LONGEST,
+    REST,
+    TABLE_STEPS,
+    UNIT_NS,
+    follow,
+    new_state,
+    passes_over,
+    starts_of_runs,
+)
+
+
+class Measured(NamedTuple):
+    """Times of many records: the ends, the largest lateness, the longest step, the median one."""
+
+    earliest_ns: int
+    latest_ns: int
+    lateness_ns: int
+    longest_step_ns: int
+    period_ns: int
 
 
 class Thinner:
@@ -22,8 +47,9 @@ class Thinner:
 
     def __init__(self, tolerance_ns: int, run_records: int) -> None:
         self._tolerance_ns, self._run_records = tolerance_ns, run_records
-        self._latest_ns: int | None = None
+        self._state = new_state()
         self._steps: list[tuple[Int64Array, Int64Array]] = []
+        self._table = np.zeros(0, dtype=np.int64)  # numbers of steps ahead, by their length in units
 
     def kept(self, time_ns: Int64Array, usable: BoolArray) -> BoolArray:
         """Tell which records of a window are needed, shape (n,).
@@ -44,21 +70,41 @@ class Thinner:
 
     def _kept(self, time: Int64Array) -> BoolArray:
         """Tell which of the usable records are needed, whatever stands between them."""
+        starts = starts_of_runs(time, self._tolerance_ns)
+        lengths = np.diff(starts, append=len(time))
+        ahead = self._ahead(time, starts, lengths)
+        if passes_over(time):
+            return self._followed(time, starts, ahead)
         steps = np.diff(time)
         self._steps.append(np.unique(steps[steps > 0], return_counts=True))
-        kept = self._of_runs(time, steps)
+        kept = self._of_runs(time, starts, lengths, ahead)
         stretch = time // (self._tolerance_ns // 2)
         enters = stretch[1:] != stretch[:-1]
         kept[1:] |= enters
         kept[:-1] |= enters
         return kept
 
+    def _followed(self, time: Int64Array, starts: Int64Array, ahead: BoolArray) -> BoolArray:
+        """Do the same in one pass."""
+        if not len(self._table):
+            self._table = np.zeros(TABLE_STEPS, dtype=np.int64)
+        kept, rest = np.empty(len(time), dtype=bool), np.empty(len(time), dtype=np.int64)
+        follow(time, starts, ahead, self._tolerance_ns, self._run_records, kept, self._table, rest, self._state)
+        if self._state[REST]:
+            self._steps.append(np.unique(rest[: self._state[REST]], return_counts=True))
+        return kept
+
+    def measured(self, time: Int64Array) -> Measured:
+        """Return the figures of many records that are all believed."""
+        self._followed(time, np.zeros(1, dtype=np.int64), np.zeros(1, dtype=bool))
+        return Measured(*self._state[[EARLIEST, LATEST, LATENESS, LONGEST]].tolist(), self.period_ns)
+
     @property
     def period_ns(self) -> int:
         """Median of the forward steps between usable records of the thinned windows; 0 of none."""
-        if not self._steps:
-            return 0
-        steps, counts = (np.concatenate(parts) for parts in zip(*self._steps, strict=True))
+        met = np.flatnonzero(self._table)
+        parts = [*self._steps, (met * UNIT_NS, self._table[met])]
+        steps, counts = (np.concatenate(several) for several in zip(*parts, strict=True))
         order = np.argsort(steps, kind="stable")
         reached = np.cumsum(counts[order])
         if not len(reached):
@@ -66,21 +112,16 @@ class Thinner:
         middle = np.searchsorted(reached, ((reached[-1] - 1) // 2, reached[-1] // 2), side="right")
         return int(steps[order[middle]].sum()) // 2
 
-    def _of_runs(self, time: Int64Array, steps: Int64Array) -> BoolArray:
+    def _of_runs(self, time: Int64Array, starts: Int64Array, lengths: Int64Array, ahead: BoolArray) -> BoolArray:
         """Select beginnings of runs, both ends of the window, and late records."""
-        starts = np.concatenate(([0], np.flatnonzero(np.abs(steps) > self._tolerance_ns) + 1))
-        lengths = np.diff(starts, append=len(time))
         begins = np.zeros(len(time) + 1, dtype=np.int8)
         begins[starts] = 1
         begins[starts + np.minimum(lengths, self._run_records)] -= 1  # behind the beginning of a run
         kept: BoolArray = np.cumsum(begins[:-1], dtype=np.int8) > 0
         kept[-self._run_records :] = True
-        ahead = self._ahead(time, starts, lengths)
         seen = np.where(np.repeat(ahead, lengths), time.min(), time) if ahead.any() else time
-        latest = np.maximum.accumulate(seen)
-        if self._latest_ns is not None:
-            latest = np.maximum(latest, self._latest_ns)
-        self._latest_ns = int(latest[-1])
+        latest = np.maximum(np.maximum.accumulate(seen), self._state[LATEST])
+        self._state[LATEST] = latest[-1]
         kept |= latest - time > self._tolerance_ns
         return kept
 

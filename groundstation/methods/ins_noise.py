@@ -11,7 +11,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.shipped_toml import ShippedToml
-from groundstation.base.toml_settings import number, settings_from
+from groundstation.base.toml_settings import number, settings_from, trusted
 
 RADPS_PER_DPH = math.pi / 180.0 / 3600.0
 RADPS2_PER_DPHPH = RADPS_PER_DPH / 3600.0
@@ -227,7 +227,8 @@ def load_class(name: str) -> InsNoise:
     'navigation'
     """
     file = _CLASSES.read(name)
-    return settings_from(InsNoise, {"name": file.name} | file.table, file.where)
+    table = {"name": file.name} | file.table
+    return trusted(InsNoise, table) if file.is_shipped else settings_from(InsNoise, table, file.where)
 
 
 def choose_class(asked_for: str, aircraft_class: str = "", logged_class: str = "") -> tuple[InsNoise, str]:

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from groundstation.base import arrow_compute as pc
 from groundstation.base import arrow_values as arrow
 from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
+from groundstation.base import arrow_compute as pc
 from groundstation.base import arrow_values as arrow
 from groundstation.base.records import Column
 from groundstation.readers import cells, dms

@@ -4,8 +4,8 @@ import re
 from typing import Any
 
 import numpy as np
-import pyarrow.compute as pc
 
+from groundstation.base import arrow_compute as pc
 from groundstation.base import arrow_values as arrow
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-import pyarrow.compute as pc
 
+from groundstation.base import arrow_compute as pc
 from groundstation.base import arrow_values as arrow
 from groundstation.base.compile import in_place, inlined
 from groundstation.base.records import Column

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache
-from html import escape
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -101,6 +100,8 @@ class Tabular(Brief):
 
     def _repr_html_(self) -> str:
         """Return all fields that are no list, and the names of its tables, for notebooks."""
+        from html import escape
+
         import pandas as pd
 
         shown = {part.name: getattr(self, part.name) for part in fields(cast(Any, self))}

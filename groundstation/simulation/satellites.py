@@ -9,7 +9,7 @@ Source: Vallado, Fundamentals of Astrodynamics and Applications, 4th ed. 2013, s
 """
 
 from functools import cache
-from importlib import resources
+from pathlib import Path
 
 import numpy as np
 
@@ -48,7 +48,7 @@ class Orbit:
 @cache
 def orbits() -> dict[str, Orbit]:
     """The shipped orbits by name: ``GPS-13``, ``GLO-730``."""
-    text = (resources.files("groundstation.simulation") / "orbits" / "satellites.csv").read_text(encoding="utf-8")
+    text = Path(__file__).with_name("orbits").joinpath("satellites.csv").read_text(encoding="utf-8")
     rows = [line.split(",") for line in text.splitlines() if line and not line.startswith("#")][1:]
     found = {}
     for name, _catalogue, epoch, *elements in rows:

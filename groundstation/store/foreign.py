@@ -17,13 +17,11 @@ from mcap.records import Channel, Header, Schema
 
 from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
+from groundstation.store.decompress import MAX_CHUNK_BYTES, ChunkError, decompress
 from groundstation.store.framing import (
-    MAX_CHUNK_BYTES,
     MAX_RECORD_BYTES,
-    ChunkError,
     ChunkHead,
     Summary,
-    decompress,
     ends_whole,
     parse_record,
     parse_records,

@@ -10,11 +10,9 @@ import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import field
 from io import BytesIO
-from typing import Any, BinaryIO, TypeAlias, cast
+from typing import Any, BinaryIO, cast
 
-import lz4.frame
 import numpy as np
-import zstandard
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
@@ -37,7 +35,6 @@ from groundstation.base.records import Int64Array
 from groundstation.store.marks import MAGIC, RECORD_PREFIX
 from groundstation.store.messages import HEAD, MESSAGE_OPCODE, ByteArray, ChunkMessages
 
-MAX_CHUNK_BYTES = 64 << 20  # largest chunk, decompressed; the writer's have about one megabyte
 MAX_RECORD_BYTES = 64 << 20  # largest record that is read whole
 FOOTER_BYTES = RECORD_PREFIX + 20
 SHIFTED_BYTES = 8 << 20  # part of the end searched for a summary; only one of a million chunks is longer
@@ -59,11 +56,6 @@ _READABLE: Mapping[int, Any] = {
     Opcode.SUMMARY_OFFSET: SummaryOffset,
     Opcode.DATA_END: DataEnd,
 }
-Buffer: TypeAlias = bytes | memoryview
-
-
-class ChunkError(Exception):
-    """Error of a chunk that cannot be used; the text says why."""
 
 
 def to_bytes(*records: McapRecord) -> bytes:
@@ -179,54 +171,6 @@ def read_chunk_head(data: bytes, *, need_lengths: bool = True) -> ChunkHead | No
     return ChunkHead(length + RECORD_PREFIX, start, end, size, crc, compression.decode(), data_at)
 
 
-def decompress(compression: str, data: Buffer, size: int, crc: int | None) -> ByteArray:
-    """Decompress the records of a chunk and check its checksum.
-
-    Parameters
-    ----------
-    compression : {'zstd', 'lz4', ''}
-    data : bytes-like
-    size : int
-        Bytes that must come out; no more is ever allocated than this and ``MAX_CHUNK_BYTES``.
-    crc : int, optional
-        CRC-32 of what comes out; None when there is none to compare.
-
-    Raises
-    ------
-    ChunkError
-        When the data is not what was written.
-    """
-    if size > MAX_CHUNK_BYTES:
-        raise ChunkError(f"claims {size} bytes, more than {MAX_CHUNK_BYTES}")
-    try:
-        if compression == "zstd":
-            raw = _zstd(data, size)
-        elif compression == "lz4":
-            raw = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
-        else:
-            raw = bytes(data)
-    except (zstandard.ZstdError, RuntimeError, ValueError, EOFError, MemoryError):
-        raise ChunkError("cannot be decompressed") from None
-    if len(raw) != size:
-        raise ChunkError("has another size than it claims")
-    if crc is not None and zlib.crc32(raw) != crc:
-        raise ChunkError("checksum differs")
-    return np.frombuffer(raw, np.uint8)
-
-
-def _zstd(data: Buffer, size: int) -> bytes:
-    """Decompress one zstd frame.
-
-    The size that the frame claims is compared first, since the library allocates by it.
-    """
-    claimed = zstandard.get_frame_parameters(data).content_size
-    if claimed not in (size, zstandard.CONTENTSIZE_UNKNOWN):
-        raise ChunkError("has another size than it claims")
-    if size == 0:
-        return b""
-    return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
-
-
 def split_messages(buffer: ByteArray) -> list[ChunkMessages] | None:
     """Split a chunk into messages by channel; None when it is not made of whole records."""
     if not len(buffer):
@@ -254,13 +198,15 @@ def _evenly_spaced(buffer: ByteArray) -> ChunkMessages | None:
     stride = int(head["length"]) + RECORD_PREFIX
     if stride < HEAD.itemsize or stride > len(buffer) or len(buffer) % stride:
         return None
-    matrix = buffer.reshape(-1, stride)
-    for words in (matrix[:, 0:8].view("<u8"), matrix[:, 3:11].view("<u8")):  # together: opcode, length and channel
-        if (words != words[0]).any():
-            return None
-    count = len(matrix)
-    starts = np.arange(count, dtype=np.int64) * stride
-    return ChunkMessages(buffer, int(head["channel_id"]), starts, np.full(count, stride, np.int64), stride)
+    count = len(buffer) // stride
+    messages = ChunkMessages(
+        buffer,
+        int(head["channel_id"]),
+        np.arange(count, dtype=np.int64) * stride,
+        np.broadcast_to(np.int64(stride), count),
+        stride,
+    )
+    return messages if messages.is_alike(0, HEAD.fields["sequence"][1]) else None
 
 
 @dataclass

@@ -80,8 +80,21 @@ class ChunkMessages:
 
         The records must have an even stride.
         """
-        values: NDArray[Any] = self.matrix()[:, offset : offset + dtype.itemsize].view(dtype)[:, 0]
-        return values
+        return np.ndarray((len(self),), dtype, self.buffer.data, int(self.starts[0]) + offset, (self.stride,))
+
+    def is_alike(self, start: int, stop: int) -> bool:
+        """Tell whether the bytes from ``start`` to ``stop`` of every record are those of the first.
+
+        The records must have an even stride.
+        """
+        first = int(self.starts[0])
+        dtype = np.dtype("<u8") if stop - start >= 8 else np.dtype("u1")
+        for at in range(start, stop, dtype.itemsize):
+            at = min(at, stop - dtype.itemsize)
+            expected = int.from_bytes(self.buffer[first + at : first + at + dtype.itemsize].tobytes(), "little")
+            if (self.column(dtype, at) != expected).any():
+                return False
+        return True
 
 
 def at_any_byte(buffer: ByteArray, dtype: np.dtype[Any]) -> NDArray[Any]:

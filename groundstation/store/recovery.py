@@ -19,14 +19,12 @@ from mcap.records import Channel, ChunkIndex, Metadata, Schema
 from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.store.channel import COLUMNS_KEY, DERIVED_KEY
+from groundstation.store.decompress import MAX_CHUNK_BYTES, ChunkError, Unpacker
 from groundstation.store.framing import (
     INDEX_ENTRY,
-    MAX_CHUNK_BYTES,
     MAX_RECORD_BYTES,
-    ChunkError,
     ChunkHead,
     Summary,
-    decompress,
     ends_whole,
     parse_record,
     read_chunk_head,
@@ -115,9 +113,9 @@ def _read(file: BinaryIO, at: int, length: int) -> bytes:
     return file.read(length)
 
 
-def _opened(data: memoryview, compression: str, size: int, crc: int) -> list[ChunkMessages]:
+def _opened(unpacker: Unpacker, data: memoryview, compression: str, size: int, crc: int) -> list[ChunkMessages]:
     """Return the messages of a chunk's compressed data; ChunkError when it is not intact."""
-    messages = split_messages(decompress(compression, data, size, crc))
+    messages = split_messages(unpacker.decompress(compression, data, size, crc))
     if messages is None:
         raise ChunkError("its records do not fit together")
     return messages
@@ -138,8 +136,11 @@ def index_fits(file: BinaryIO, summary: Summary) -> bool:
 
 
 def chunks_by_index(file: BinaryIO, summary: Summary) -> Iterator[Found]:
-    """Yield the chunks of a file with an intact summary, in the order of the file."""
-    free_from = len(MAGIC)
+    """Yield the chunks of a file with an intact summary, in the order of the file.
+
+    The messages of a chunk are gone when the next one is asked for.
+    """
+    free_from, unpacker = len(MAGIC), Unpacker()
     for index in sorted(summary.chunks, key=lambda index: index.chunk_start_offset):
         start, length = index.chunk_start_offset, index.chunk_length
         inside = free_from <= start and start + length <= summary.start and index.compressed_size <= length
@@ -147,13 +148,13 @@ def chunks_by_index(file: BinaryIO, summary: Summary) -> Iterator[Found]:
             yield _lost(index, None, "its index leads outside the file")
             continue
         free_from = start + length
-        data = _read(file, start, length)
+        data = unpacker.read(file, start, length)
         head = read_chunk_head(data, need_lengths=False)
         try:
             if head is None:
                 raise ChunkError("is too short")
-            content = memoryview(data)[length - index.compressed_size :]
-            messages = _opened(content, index.compression, index.uncompressed_size, head.crc)
+            content = data[length - index.compressed_size :]
+            messages = _opened(unpacker, content, index.compression, index.uncompressed_size, head.crc)
         except ChunkError as error:
             known = read_message_index(_read(file, free_from, min(index.message_index_length, MAX_RECORD_BYTES)))
             yield _lost(index, known[1] if known else None, str(error))
@@ -170,6 +171,7 @@ def _lost(index: ChunkIndex, count: int | None, reason: str) -> Lost:
 def chunks_by_walk(file: BinaryIO, size: int) -> Iterator[Found]:
     """Yield the chunks of a file without a usable summary, in the order of the file.
 
+    The messages of a chunk are gone when the next one is asked for.
     The last item is a :class:`Lost` of ``is_cut`` when the file ends before its data does, without bytes where a whole
     record stands before the cut.
     """
@@ -183,11 +185,12 @@ def chunks_by_walk(file: BinaryIO, size: int) -> Iterator[Found]:
 
 
 def _walked(file: BinaryIO, at: int, size: int, has_end: bool) -> Iterator[Found]:
+    unpacker = Unpacker()
     while at < size:
         peek = _read(file, at, PEEK_BYTES)
         head = _chunk_at(peek, at, size)
         if head is not None:
-            found, at = _try_chunk(file, at, size, head)
+            found, at = _try_chunk(unpacker, file, at, size, head)
             yield found
             continue
         end = _record_end(file, at, size, peek)
@@ -206,13 +209,13 @@ def _walked(file: BinaryIO, at: int, size: int, has_end: bool) -> Iterator[Found
         yield Lost(size, size, "the file ends without its summary", is_cut=True)
 
 
-def _try_chunk(file: BinaryIO, at: int, size: int, head: ChunkHead) -> tuple[Found, int]:
+def _try_chunk(unpacker: Unpacker, file: BinaryIO, at: int, size: int, head: ChunkHead) -> tuple[Found, int]:
     """Return the chunk at ``at`` and the place to go on from."""
     data = _read(file, at, head.length)
     end = at + head.length
     try:
         content = memoryview(data)[head.data_at :]
-        messages = _opened(content, head.compression, head.uncompressed_size, head.crc)
+        messages = _opened(unpacker, content, head.compression, head.uncompressed_size, head.crc)
     except ChunkError as error:
         if not _is_plausible(file, end, size):  # the stated length cannot be trusted then
             end = find_chunk(file, at + 1, size)

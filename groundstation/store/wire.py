@@ -317,8 +317,7 @@ def _template(messages: ChunkMessages, fields: Sequence[WireField]) -> list[tupl
     the fields asked for, each once, with one-byte bools: such messages are walked one by one.
     """
     by_tag = {field.tag: k for k, field in enumerate(fields)}
-    matrix = messages.matrix()
-    first = matrix[0].tobytes()
+    first = messages.matrix()[0].tobytes()
     found: list[tuple[int, int] | None] = [None] * len(fields)
     at = HEAD.itemsize
     while at < len(first):
@@ -335,10 +334,9 @@ def _template(messages: ChunkMessages, fields: Sequence[WireField]) -> list[tupl
             width = dtype.itemsize
         if at + width > len(first):
             return None
-        for column in range(constant, at):
-            if (matrix[:, column] != first[column]).any():
-                return None
-        if fields[k].wire_type == 0 and (matrix[:, at] > 1).any():
+        if not messages.is_alike(constant, at):
+            return None
+        if fields[k].wire_type == 0 and (messages.column(np.dtype("u1"), at) > 1).any():
             return None
         found[k] = (at, width)
         at += width

@@ -5,6 +5,7 @@ a :class:`System`. One that fails is a line of text and never hides the others.
 """
 
 from functools import cache
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -33,3 +34,14 @@ def systems() -> "Systems":
     from groundstation.systems.loading import load_systems
 
     return load_systems(OURS, ENTRY_POINT_GROUP)
+
+
+@cache
+def systems_for(name: str) -> "Systems":
+    """Return our system of that name alone, all systems where none of ours has it: what one serves loads no other."""
+    path = f"{__name__}.{name}.system"
+    if path not in OURS:
+        return systems()
+    from groundstation.systems.system import Systems
+
+    return Systems((import_module(path).SYSTEM,))

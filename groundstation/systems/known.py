@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, SettingsError
-from groundstation.base.runways.table import RunwayTable
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.toml_settings import check_ranges, number, required_number
 from groundstation.results.answer import A, Answers, answer_meeting, answer_of
@@ -21,6 +20,7 @@ from groundstation.tables.phases import Phases
 from groundstation.tables.vehicle import VehicleKind
 
 if TYPE_CHECKING:
+    from groundstation.base.runways.table import RunwayTable
     from groundstation.tables.session_assemble import Truth
 
 S = TypeVar("S")
@@ -228,6 +228,11 @@ class SiteData:
         return self.stands[0] if len(self.stands) == 1 else None
 
 
+def no_runways() -> tuple["RunwayTable | None", str]:
+    """Return no runways of the world: they are not looked up."""
+    return None, ""
+
+
 @dataclass(frozen=True)
 class Known:
     """Inputs of an analysis besides the tables of a flight.
@@ -254,10 +259,9 @@ class Known:
         What earlier flights say of installations, where the user gives a file of them.
     roles : mapping of role to callable
         What the analyses offer to each other, whether they gave an answer or not: ``roles[kind](known)`` makes it.
-    runways : RunwayTable, optional
-        Runways of the world, below those of ``site``; None: not looked up.
-    runways_problem : str
-        Why the user's own table is not that one.
+    find_runways : callable
+        Gives the runways of the world, below those of ``site``, and why the user's own table is not that one. It reads
+        them, so it is asked by those that need them; by default there are none.
     """
 
     phases: Phases
@@ -271,8 +275,17 @@ class Known:
     workings: Mapping[str, Any] = field(default_factory=dict)
     lessons: tuple[Lesson, ...] | None = None
     roles: Mapping[type[Any], Callable[["Known"], Any]] = field(default_factory=dict)
-    runways: RunwayTable | None = None
-    runways_problem: str = ""
+    find_runways: Callable[[], tuple["RunwayTable | None", str]] = no_runways
+
+    @property
+    def runways(self) -> "RunwayTable | None":
+        """Runways of the world; None: not looked up."""
+        return self.find_runways()[0]
+
+    @property
+    def runways_problem(self) -> str:
+        """Why the user's own table of runways is not used; empty where it is, or there is none."""
+        return self.find_runways()[1]
 
     @property
     def excluded_s(self) -> tuple[tuple[float, float], ...]:

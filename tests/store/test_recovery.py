@@ -19,8 +19,9 @@ from groundstation.base.errors import GroundstationError, UnreadableLogError
 from groundstation.base.records import Damage, LogHeader, RecordBatch
 from groundstation.store import walk
 from groundstation.store.channel import CHUNK_SPAN_NS
+from groundstation.store.decompress import MAX_CHUNK_BYTES
 from groundstation.store.foreign import ForeignLost, ForeignMcap, ForeignMessages, UnknownChannel
-from groundstation.store.framing import MAX_CHUNK_BYTES, to_bytes
+from groundstation.store.framing import to_bytes
 from groundstation.store.info import StoreInfo
 from groundstation.store.marks import MAGIC
 from groundstation.store.reader import read, read_info

@@ -76,25 +76,64 @@ class Rates:
         series.exponentials(self.size, self.rows, self.columns, given, over, rows, columns, scratch, entries)
         return entries
 
+    def matrices(self, values: FloatArray, seconds: FloatArray) -> FloatArray:
+        """Return exp(A t) over each of k steps as full matrices, shape (k, n, n)."""
+        out = np.tile(np.eye(self.size), (len(seconds), 1, 1))
+        out[:, *self.reach] = self.exponentials(values, seconds)
+        return out
+
     def with_noise(self, exponentials: FloatArray, seconds: FloatArray, density: FloatArray) -> Transition:
         """Return the transition over steps whose exponentials are known."""
         noise, diagonal = 0.5 * np.outer(seconds, density), np.arange(self.size)
         return Transition.sparse(self.size, *self.reach, exponentials, diagonal, diagonal, noise, noise)
 
-    def carried(self, values: FloatArray, step_s: float, every: int, start: FloatArray) -> FloatArray:
-        """Carry a state forward in equal steps.
+    def carried(
+        self, values: FloatArray, step: Int64Array, step_s: float, every: int, starts: FloatArray
+    ) -> FloatArray:
+        """Carry the states of many starts forward in equal steps.
 
-        The result is the state after every ``every`` of them, shape (steps // every, n).
+        The result is each state after every ``every`` of them, shape (s, k // every, n).
 
         Parameters
         ----------
-        values : ndarray, shape (steps, m)
-            Entries of A over each step.
-        start : ndarray, shape (n,)
+        values : ndarray, shape (d, m)
+            Entries of A over each distinct step.
+        step : ndarray of int, shape (s, k)
+            Which of them each step of a start is.
+        starts : ndarray, shape (s, n)
         """
         from groundstation.methods.kalman import series
 
-        out, x = np.empty((len(values) // every, self.size)), np.array(start, dtype=np.float64)
-        entries, scratch = frozen(np.ascontiguousarray(values)), np.empty((2, self.size))
-        series.carry_by_rates(self.rows, self.columns, entries, float(step_s), every, x, scratch, out)
+        out, x = np.empty((len(step), step.shape[1] // every, self.size)), np.array(starts, dtype=np.float64, order="C")
+        entries, which = frozen(np.ascontiguousarray(values)), frozen(np.ascontiguousarray(step, dtype=np.int64))
+        scratch = np.empty((2, self.size))
+        series.carry_by_rates(self.rows, self.columns, entries, which, float(step_s), every, x, scratch, out)
+        return out
+
+    def variances(
+        self,
+        values: FloatArray,
+        step: Int64Array,
+        step_s: float,
+        every: int,
+        starts: FloatArray,
+        density: FloatArray,
+    ) -> FloatArray:
+        """Carry the covariances of many starts forward as :meth:`carried` does the states.
+
+        The result is the variance of each state, shape (s, k // every, n).
+
+        Parameters
+        ----------
+        starts : ndarray, shape (s, n, n)
+        density : ndarray, shape (n,)
+            Power spectral densities of the white noises.
+        """
+        F, half = self.matrices(values, np.full(len(values), step_s)), 0.5 * step_s * np.diag(density)
+        P, out = starts, np.empty((len(step), step.shape[1] // every, self.size))
+        for k in range(out.shape[1] * every):
+            over = F[step[:, k]]
+            P = over @ (P + half) @ over.transpose(0, 2, 1) + half
+            if (k + 1) % every == 0:
+                out[:, k // every] = np.einsum("sii->si", P)
         return out

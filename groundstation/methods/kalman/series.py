@@ -1,6 +1,6 @@
 """Compiled exponentials of a sparse matrix of rates, x' = A x.
 
-One function gives them as transitions of the filter, another applies them to a state. Both are good to the fourth order
+One function gives them as transitions of the filter, another applies them to states. Both are good to the fourth order
 of the step: the caller keeps |A| x seconds small ((|A| t)^5 / 120 of the state is left out).
 
 Source: C. Moler, C. Van Loan, Nineteen dubious ways to compute the exponential of a matrix, SIAM Review 45, 2003,
@@ -67,43 +67,45 @@ def carry_by_rates(
     rows: Int64Array,
     columns: Int64Array,
     rates: FloatArray,
+    step: Int64Array,
     step_s: float,
     every: int,
     x: FloatArray,
     scratch: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Carry a state forward in equal steps without forming a matrix.
-
-    Each step has rates of its own.
+    """Carry the states of many starts forward in equal steps without forming a matrix.
 
     Parameters
     ----------
     rows, columns, rates
-        Pattern (m,) and entries (steps, m) of A over each step.
+        Pattern (m,) and entries (d, m) of A over each distinct step.
+    step : ndarray of int, shape (s, k)
+        Number of the distinct step that each step of a start is.
     every : int
         Steps between two leads.
-    x : ndarray, shape (n,)
+    x : ndarray, shape (s, n)
         Changed in place.
     scratch : ndarray, shape (2, n)
         Overwritten.
-    out : ndarray, shape (leads, n)
+    out : ndarray, shape (s, leads, n)
         Filled: the state after every ``every`` steps.
     """
-    n = len(x)
+    n = x.shape[1]
     term, new = scratch[0], scratch[1]
-    for lead in range(out.shape[0]):
-        for part in range(every):
-            k = lead * every + part
+    for s in range(len(x)):
+        for lead in range(out.shape[1]):
+            for part in range(every):
+                k = step[s, lead * every + part]
+                for i in range(n):
+                    term[i] = x[s, i]
+                for order in range(1, ORDER + 1):
+                    for i in range(n):
+                        new[i] = 0.0
+                    for e in range(len(rows)):
+                        new[rows[e]] += rates[k, e] * term[columns[e]]
+                    for i in range(n):
+                        term[i] = new[i] * step_s / order
+                        x[s, i] += term[i]
             for i in range(n):
-                term[i] = x[i]
-            for order in range(1, ORDER + 1):
-                for i in range(n):
-                    new[i] = 0.0
-                for e in range(len(rows)):
-                    new[rows[e]] += rates[k, e] * term[columns[e]]
-                for i in range(n):
-                    term[i] = new[i] * step_s / order
-                    x[i] += term[i]
-        for i in range(n):
-            out[lead, i] = x[i]
+                out[s, lead, i] = x[s, i]

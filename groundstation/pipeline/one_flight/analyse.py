@@ -3,10 +3,10 @@
 Everything that the data allows is answered.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field, replace
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,6 @@ from groundstation.base.failures import attempt, left_out
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.gaps import Gaps
 from groundstation.base.ledger import Ledger
-from groundstation.base.runways.kept import usable_runways
 from groundstation.base.signals import topics_of_kind
 from groundstation.integrity.ledger import gaps_of
 from groundstation.methods import overview
@@ -41,6 +40,10 @@ from groundstation.tables.simulated import CODE as SIMULATED
 from groundstation.tables.simulated import simulated_by
 from groundstation.tables.table import Flight
 from groundstation.tables.vehicle import ALWAYS_ON_GROUND, CONTRADICTION, STATED_BY, VEHICLE
+
+if TYPE_CHECKING:
+    from groundstation.base.runways.table import RunwayTable
+    from groundstation.systems.system import Systems
 
 INFO: Severity = "info"
 WARN: Severity = "warn"
@@ -146,7 +149,7 @@ def _simulated(simulator: str) -> dict[str, str]:
 
 def _as_stated(flight: Flight, configuration: Configuration) -> Flight:
     """Return the flight with the kind of vehicle that the aircraft file states."""
-    kind = configuration.settings.aircraft.stated_vehicle
+    kind = configuration.aircraft.stated_vehicle
     if not kind:
         return flight
     told = {VEHICLE: kind, ALWAYS_ON_GROUND: "true" if kind == "rolls" else "false", STATED_BY: "aircraft file"}
@@ -183,13 +186,13 @@ def _refused(analysis: Analysis) -> Analysis:
     return replace(analysis, run=run, is_expected=lambda _data, _known: False)
 
 
-def known_of(flight: Flight, configuration: Configuration) -> Known:
+def known_of(flight: Flight, configuration: Configuration, among: "Systems | None" = None) -> Known:
     """Return what the analyses may use besides the tables of a flight.
 
-    Phases, and all that the user states about it.
+    Phases, and all that the user states about it. ``among`` holds the systems that are asked, all by default; roles
+    that others offer are found when they are asked for.
     """
-    settings = configuration.settings
-    runways, problem = usable_runways()
+    settings = configuration.settings if among is None else configuration.settings_among(among)
     known = Known(
         phases=flight_phases(flight),
         aircraft=settings.aircraft,
@@ -197,14 +200,36 @@ def known_of(flight: Flight, configuration: Configuration) -> Known:
         settings=settings.analyses,
         weather=configuration.weather,
         lessons=configuration.lessons,
-        roles=systems().roles,
-        runways=runways,
-        runways_problem=problem,
+        roles=systems().roles if among is None else _Roles(among),
+        find_runways=_runways,
     )
     try:
         return replace(known, intervals=_intervals(flight, configuration))
     except SettingsError as error:  # intervals in UTC for a flight without it: this flight's trouble alone
         return replace(known, intervals_problem=error)
+
+
+class _Roles(Mapping[type[Any], Callable[[Any], Any]]):
+    """Roles that some systems offer, and those of all others once one of these is asked for."""
+
+    def __init__(self, among: "Systems") -> None:
+        self._among = among
+
+    def __getitem__(self, role: type[Any]) -> Callable[[Any], Any]:
+        offered = self._among.roles.get(role)
+        return systems().roles[role] if offered is None else offered
+
+    def __iter__(self) -> Iterator[type[Any]]:
+        return iter(systems().roles)
+
+    def __len__(self) -> int:
+        return len(systems().roles)
+
+
+def _runways() -> "tuple[RunwayTable, str]":
+    from groundstation.base.runways.kept import usable_runways
+
+    return usable_runways()
 
 
 def run_analyses(analyses: tuple[Analysis, ...], data: Any, known: Any) -> Answered:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from groundstation.results.installations import Lesson
     from groundstation.systems.applied import Asked
     from groundstation.systems.known import AircraftData, SiteData
+    from groundstation.systems.system import Systems
     from groundstation.tables.session_settings import SessionSettings
 
 ISOLATION = "isolation"  # the table that changes no result: it is not kept
@@ -172,7 +173,7 @@ class Configuration:
         self.thresholds  # noqa: B018 -- raises now if a value is wrong
         self.rules  # noqa: B018
         self.isolation  # noqa: B018
-        if self.tables.keys() - {"thresholds", "rules", ISOLATION}:
+        if not self._is_as_shipped:
             self.settings  # noqa: B018
 
     @cached_property
@@ -194,20 +195,39 @@ class Configuration:
     def settings(self) -> UserSettings:
         """Settings of the analyses, the aircraft, the site and the session."""
         from groundstation.systems import systems
-        from groundstation.systems.known import AircraftData, SiteData
+
+        return self._settings(systems())
+
+    def settings_among(self, among: "Systems") -> UserSettings:
+        """Return the settings with those of the analyses of some systems alone.
+
+        Where the user states any they are those of all, which are checked together.
+        """
+        return self._settings(among) if self._is_as_shipped else self.settings
+
+    @cached_property
+    def aircraft(self) -> "AircraftData":
+        """Knowledge of the aircraft."""
+        from groundstation.systems.known import AircraftData
+
+        return self._table("aircraft", AircraftData)
+
+    @property
+    def _is_as_shipped(self) -> bool:
+        return not self.tables.keys() - {"thresholds", "rules", ISOLATION}
+
+    def _settings(self, among: "Systems") -> UserSettings:
+        from groundstation.systems.known import SiteData
         from groundstation.tables.session_settings import SessionSettings
 
-        types = {
-            analysis.settings_table: analysis.settings
-            for analysis in (*systems().analyses, *systems().session_analyses)
-        }
+        types = {analysis.settings_table: analysis.settings for analysis in (*among.analyses, *among.session_analyses)}
         settings = UserSettings(
             {name: self._table(name, kind) for name, kind in types.items()},
-            self._table("aircraft", AircraftData),
+            self.aircraft,
             self._table("site", SiteData),
             self._table("session", SessionSettings),
         )
-        for analysis in systems().analyses:
+        for analysis in among.analyses:
             analysis.check(settings.analyses[analysis.settings_table], settings.aircraft)
         return settings
 

@@ -143,10 +143,10 @@ def require_purpose_of(purpose: str) -> bool:
     """
     if not purpose:
         return False
-    from groundstation.pipeline.verbs.usable import SESSION_PURPOSES, require_purpose
+    from groundstation.pipeline.verbs.usable import is_of_session, require_purpose
 
     require_purpose(purpose)
-    return purpose in SESSION_PURPOSES
+    return is_of_session(purpose)
 
 
 def check_here(

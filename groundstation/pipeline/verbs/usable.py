@@ -5,7 +5,6 @@ Told without running the analysis where it can examine the data; else it is run,
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 from groundstation.base.dataclasses import dataclass
@@ -14,20 +13,26 @@ from groundstation.base.findings import Finding
 from groundstation.base.signals import topics_of_kind
 from groundstation.pipeline.one_flight.analyse import known_of, run_analyses, seen_by_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.systems import systems
+from groundstation.systems import systems, systems_for
 from groundstation.systems.analysis import Analysis, Shortfall
 from groundstation.systems.known import Known, SessionKnown
 from groundstation.tables.table import Flight
 
 if TYPE_CHECKING:
+    from groundstation.systems.system import Systems
     from groundstation.tables.session_settings import Stations
 
 LISTED = 3  # spans listed for a shortfall
 
-FLIGHT_PURPOSES: Mapping[str, Analysis] = MappingProxyType({one.name: one for one in systems().analyses})
-SESSION_PURPOSES: Mapping[str, Analysis] = MappingProxyType(
-    {one.name: one for one in systems().session_analyses if one.examine}
-)
+
+def flight_purposes(among: "Systems | None" = None) -> Mapping[str, Analysis]:
+    """Return the analyses of a flight by name: those of some systems, of all by default."""
+    return {one.name: one for one in (among or systems()).analyses}
+
+
+def session_purposes(among: "Systems | None" = None) -> Mapping[str, Analysis]:
+    """Return the analyses of a session that can be asked for, by name, as :func:`flight_purposes`."""
+    return {one.name: one for one in (among or systems()).session_analyses if one.examine}
 
 
 @dataclass(frozen=True)
@@ -87,18 +92,34 @@ def require_purpose(name: str) -> None:
     ------
     UsageError
     """
-    names = (*FLIGHT_PURPOSES, *SESSION_PURPOSES)
+    among = _asked(name)
+    names = (*flight_purposes(among), *session_purposes(among))
     if name not in names:
         raise UsageError(f"--for {name}", "no such purpose", f"one of {', '.join(names)}")
 
 
+def is_of_session(purpose: str) -> bool:
+    """Tell whether a purpose is an analysis of several logs together."""
+    return purpose in session_purposes(_asked(purpose))
+
+
+def _asked(purpose: str) -> "Systems":
+    """Return the one system of ours that has an analysis of its own name, else all."""
+    among = systems_for(purpose)
+    return among if {purpose} & {*flight_purposes(among), *session_purposes(among)} else systems()
+
+
 def usability_of_flight(purpose: str, flight: Flight, configuration: Configuration) -> Usability:
-    """Tell whether a flight serves an analysis of flights."""
-    analysis = FLIGHT_PURPOSES[purpose]
+    """Tell whether a flight serves an analysis of flights.
+
+    An analysis that examines the data needs no other system; one that is run may.
+    """
     seen = seen_by_analyses(flight, configuration)
-    known = known_of(seen, configuration)
+    among = _asked(purpose)
+    analysis = flight_purposes(among)[purpose]
     if analysis.examine is not None:
-        return _examined(analysis, seen, known)
+        return _examined(analysis, seen, known_of(seen, configuration, among))
+    known = known_of(seen, configuration)
     return _run(analysis, flight if analysis.judges else seen, seen, known)
 
 
@@ -119,13 +140,13 @@ def _run(analysis: Analysis, data: Flight, seen: Flight, known: Known) -> Usabil
 
 def _needed(analysis: Analysis) -> tuple[Analysis, ...]:
     """Return the analyses that one builds on, and that these build on."""
-    wanted, waiting = set[str](), [*analysis.builds_on, *analysis.requires]
+    every, wanted, waiting = flight_purposes(), set[str](), [*analysis.builds_on, *analysis.requires]
     while waiting:
         name = waiting.pop()
-        if name in FLIGHT_PURPOSES and name not in wanted:
+        if name in every and name not in wanted:
             wanted.add(name)
-            waiting += [*FLIGHT_PURPOSES[name].builds_on, *FLIGHT_PURPOSES[name].requires]
-    return tuple(one for one in FLIGHT_PURPOSES.values() if one.name in wanted)
+            waiting += [*every[name].builds_on, *every[name].requires]
+    return tuple(one for one in every.values() if one.name in wanted)
 
 
 def usability_of_session(
@@ -137,7 +158,7 @@ def usability_of_session(
     """
     from groundstation.tables.session_assemble import session_from_flights
 
-    analysis = SESSION_PURPOSES[purpose]
+    analysis = session_purposes()[purpose]
     heard = {topic.partition(".")[2] for flight in flights for topic in topics_of_kind("link", flight.topics())}
     if not heard:
         return Usability(purpose, "no", (Shortfall("no ranges to another aircraft in the log (link.<peer>)"),))

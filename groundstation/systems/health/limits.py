@@ -8,8 +8,9 @@ from typing import Literal
 from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import SettingsError
 from groundstation.base.shipped_toml import ShippedToml
-from groundstation.base.toml_settings import check_ranges, number, settings_from
+from groundstation.base.toml_settings import check_ranges, number, trusted
 
+_FILES = ShippedToml("groundstation.systems", "health", "thresholds of autopilot health")
 Rule = Literal["share", "median", "mean", "rise"]
 
 
@@ -107,8 +108,7 @@ class Limit:
 @cache
 def shipped() -> Mapping[str, Threshold]:
     """Return the shipped thresholds, by quantity."""
-    file = ShippedToml("groundstation.systems", "health", "thresholds of autopilot health").read("thresholds")
-    return {name: settings_from(Threshold, table, file.where, name) for name, table in file.table.items()}
+    return {name: trusted(Threshold, table) for name, table in _FILES.read("thresholds").table.items()}
 
 
 def thresholds(stated: Mapping[str, Limit]) -> dict[str, Threshold]:

@@ -5,7 +5,7 @@
 """
 
 from functools import cache
-from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ FILE = "alignment_limits.toml"
 
 @cache
 def _table() -> dict[str, Any]:
-    text = (resources.files("groundstation.systems.inertial") / FILE).read_text(encoding="utf-8")
+    text = Path(__file__).with_name(FILE).read_text(encoding="utf-8")
     return toml_table(text, FILE, "limits of the drift while standing")
 
 

@@ -3,30 +3,33 @@
 The gain is over the two separate channels.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
-from groundstation.methods.kalman import filter as kalman
+from groundstation.base.units import NS_PER_S
+from groundstation.methods.ins_noise import InsNoise
 from groundstation.methods.kalman.arrays import REJECTED
 from groundstation.results.forecast_methods import FORECAST_HORIZONS_MIN
 from groundstation.systems.inertial.coupled import (
     CHANNELS,
     LONGEST_STEP_S,
     RATES,
-    SIZE,
     CoupledRun,
     coupled_values,
-    lines_of,
     noise_of,
 )
 from groundstation.systems.inertial.craft_motion import CraftMotion
+from groundstation.systems.inertial.differences import InsDifferences
 from groundstation.systems.inertial.forecast_answer import CoupledRow
 from groundstation.systems.inertial.hindcast import Hindcast
 from groundstation.systems.inertial.model import POSITION, FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
 
+PLACES = CHANNELS[:, POSITION]
+STEPS_AT_ONCE = 16_384  # whose entries are held in memory, 5 MB where no two are the same
 VARIANCE_STEP_S = 60.0  # of covariances carried forward: 0.07 of a Schuler radian
 
 
@@ -48,17 +51,14 @@ def hindcast_coupled(run: CoupledRun, at: Int64Array, lead_s: FloatArray, settin
         Position error forecast to build up since the start, metres: as ``Hindcast.forecast_m``.
     """
     out = np.zeros((len(at), len(lead_s), 2))
-    if not len(lead_s):
-        return out
-    every, step_s, elapsed = _steps(lead_s, min(settings.forecast_step_s, LONGEST_STEP_S))
-    measured = run.epochs.position_m[at]
+    measured, starts = run.epochs.position_m[at], np.array(run.x[at])
     is_known = np.isfinite(measured) & (run.used[at, POSITION] != REJECTED)
-    known = np.where(is_known, measured, run.x[at][:, CHANNELS[:, POSITION]])
-    for index, epoch in enumerate(at):
-        values = _values_along(run, float(run.epochs.time_s[epoch]), elapsed)
-        start = run.x[epoch].copy()
-        start[CHANNELS[:, POSITION]] = known[index]
-        out[index] = RATES.carried(values, step_s, every, start)[:, CHANNELS[:, POSITION]] - known[index]
+    known = np.where(is_known, measured, starts[:, PLACES])
+    starts[:, PLACES] = known
+    for ahead in _ahead(run, at, lead_s, min(settings.forecast_step_s, LONGEST_STEP_S)):
+        use = ahead.starts
+        built = RATES.carried(ahead.values, ahead.step, ahead.step_s, ahead.every, starts[use])
+        out[use] = built[:, :, PLACES] - known[use, None]
     return out
 
 
@@ -69,39 +69,59 @@ def coupled_variance(run: CoupledRun, at: Int64Array, lead_s: FloatArray) -> Flo
     the noise since.
     """
     out = np.zeros((len(at), len(lead_s), 2))
-    if not len(lead_s):
-        return out
-    every, step_s, elapsed = _steps(lead_s, VARIANCE_STEP_S)
     _, densities = noise_of(run.noise, run.differences, run.epochs, 0.0)
-    seconds, nothing = np.full(len(elapsed) - 1, step_s), lines_of(run.epochs, run.noise)
-    unseen = kalman.Measurements(np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros(0, np.int64), nothing)
-    kept = kalman.KeptArrays(states=False, covariances=False, gains=False, variances=True)
-    for index, epoch in enumerate(at):
-        values = _values_along(run, float(run.epochs.time_s[epoch]), elapsed)
-        start = np.array(run.P[epoch // run.every])
-        start[CHANNELS[:, POSITION]] = start[:, CHANNELS[:, POSITION]] = 0.0
-        carried = kalman.run_filter(
-            RATES.transition(values, seconds, densities),
-            np.arange(len(seconds)),
-            unseen,
-            kalman.Start(np.zeros((SIZE, 0)), start),
-            kept=kept,
-        )
-        out[index] = carried.record.variance[every - 1 :: every][:, CHANNELS[:, POSITION]]
+    starts = run.P[at // run.every]
+    starts[:, PLACES] = starts[:, :, PLACES] = 0.0
+    for ahead in _ahead(run, at, lead_s, VARIANCE_STEP_S):
+        use = ahead.starts
+        carried = RATES.variances(ahead.values, ahead.step, ahead.step_s, ahead.every, starts[use], densities)
+        out[use] = carried[:, :, PLACES]
     return out
 
 
-def _steps(lead_s: FloatArray, longest_s: float) -> tuple[int, float, FloatArray]:
-    """Steps from one lead to the next, their length, and the times since the start, from zero."""
+@dataclass(frozen=True)
+class StepsAhead:
+    """Equal steps ahead of some starts, along the INS's own motion.
+
+    Parameters
+    ----------
+    starts : slice
+        Which of the starts.
+    values : ndarray, shape (d, 41)
+        Entries of A over each distinct step: starts a whole number of steps apart share theirs.
+    step : ndarray of int, shape (s, k)
+        Which of the distinct steps each step of a start is.
+    step_s : float
+    every : int
+        Steps from one lead to the next.
+    """
+
+    starts: slice
+    values: FloatArray
+    step: Int64Array
+    step_s: float
+    every: int
+
+
+def _ahead(run: CoupledRun, at: Int64Array, lead_s: FloatArray, longest_s: float) -> Iterator[StepsAhead]:
+    return steps_ahead(run.differences, run.noise, run.epochs.time_s[at], lead_s, longest_s)
+
+
+def steps_ahead(
+    differences: InsDifferences, noise: InsNoise, start_s: FloatArray, lead_s: FloatArray, longest_s: float
+) -> Iterator[StepsAhead]:
+    """Steps of at most ``longest_s`` ahead of some times, so many starts at once as memory allows."""
+    if not len(lead_s):
+        return
     every = max(1, round(float(lead_s[0]) / longest_s))
-    step_s = float(lead_s[0]) / every
-    return every, step_s, step_s * np.arange(every * len(lead_s) + 1, dtype=np.float64)
-
-
-def _values_along(run: CoupledRun, start_s: float, elapsed_s: FloatArray) -> FloatArray:
-    """Entries of A over steps since a start, along the INS's own motion."""
-    motion = CraftMotion.between(run.differences, start_s + elapsed_s, is_strapdown=run.noise.is_strapdown)
-    return coupled_values(motion, run.noise.beta_per_s)
+    step_s, count = float(lead_s[0]) / every, every * len(lead_s)
+    elapsed, each = step_s * np.arange(count), max(1, STEPS_AT_ONCE // count)
+    for first in range(0, len(start_s), each):
+        begin = start_s[first : first + each, None] + elapsed
+        _, rows, step = np.unique(np.round(begin * NS_PER_S).astype(np.int64), return_index=True, return_inverse=True)
+        motion = CraftMotion.over(differences, begin.ravel()[rows], step_s, is_strapdown=noise.is_strapdown)
+        values = coupled_values(motion, noise.beta_per_s)
+        yield StepsAhead(slice(first, first + each), values, step.reshape(begin.shape), step_s, every)
 
 
 def coupled_rows(

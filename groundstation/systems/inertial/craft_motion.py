@@ -11,6 +11,7 @@ from groundstation.systems.inertial.differences import InsDifferences
 from groundstation.systems.inertial.model import FloatArray, normal_gravity_mps2
 
 LATITUDE_MAX_DEG = 88.0  # beyond, north is no axis for an error model
+VELOCITIES = slice(2, 4)  # among the columns of the INS at a time
 ACCELERATION_MAX_MPS2 = 50.0  # a faster change of the INS velocity is a reset of it
 
 
@@ -43,20 +44,27 @@ class CraftMotion:
 
         It is held where the INS has no samples; without any it is at rest on the equator.
         """
-        n = len(time_s)
-        latitude, altitude, north, east = (
-            np.interp(time_s, differences.epochs.time_s, column) for column in differences.motion_known
+        ends = _columns_at(differences, time_s, is_strapdown=is_strapdown)
+        return cls._over(ends[:, :-1], ends[:, 1:], np.diff(time_s))
+
+    @classmethod
+    def over(
+        cls, differences: InsDifferences, begin_s: FloatArray, seconds: float | FloatArray, *, is_strapdown: bool = True
+    ) -> "CraftMotion":
+        """The motion over intervals that begin at some times, m of them, in any order."""
+        first, last = (
+            _columns_at(differences, time_s, is_strapdown=is_strapdown) for time_s in (begin_s, begin_s + seconds)
         )
-        velocity = np.stack([north, east], axis=1)
-        seconds = np.diff(time_s)[:, None]
-        acceleration = np.diff(velocity, axis=0) / np.where(seconds > 0.0, seconds, np.inf)
-        is_step = (np.abs(acceleration) > ACCELERATION_MAX_MPS2).any(axis=1)
-        acceleration[is_step] = 0.0
-        mean = [0.5 * (part[1:] + part[:-1]) for part in (latitude, altitude, velocity)]
-        heading = np.zeros(n)
-        if is_strapdown:
-            heading = np.interp(time_s, differences.epochs.time_s, differences.unwrapped_heading_rad)
-        return cls(mean[0], mean[1], mean[2], acceleration, 0.5 * (heading[1:] + heading[:-1]))
+        return cls._over(first, last, np.asarray(np.broadcast_to(seconds, begin_s.shape)))
+
+    @classmethod
+    def _over(cls, first: FloatArray, last: FloatArray, seconds: FloatArray) -> "CraftMotion":
+        """The motion between the columns at both ends, each (5, m)."""
+        latitude, altitude, north, east, heading = 0.5 * (last + first)
+        acceleration = (last - first)[VELOCITIES] / np.where(seconds > 0.0, seconds, np.inf)
+        is_step = (np.abs(acceleration) > ACCELERATION_MAX_MPS2).any(axis=0)
+        acceleration[:, is_step] = 0.0
+        return cls(latitude, altitude, np.stack([north, east], axis=1), acceleration.T, heading)
 
     def specific_force_mps2(self) -> FloatArray:
         """Specific force north, east and down, shape (m, 3), m/s^2; vertical motion is left out.
@@ -75,6 +83,14 @@ class CraftMotion:
             ],
             axis=1,
         )
+
+
+def _columns_at(differences: InsDifferences, time_s: FloatArray, *, is_strapdown: bool) -> FloatArray:
+    """Latitude, altitude, both velocities and heading (rad) of the INS at some times, shape (5, n)."""
+    own_s = differences.epochs.time_s
+    known = [np.interp(time_s, own_s, column) for column in differences.motion_known]
+    heading = np.interp(time_s, own_s, differences.unwrapped_heading_rad) if is_strapdown else np.zeros(len(time_s))
+    return np.stack([*known, heading])
 
 
 def latitude_rad(motion: CraftMotion) -> FloatArray:

@@ -166,7 +166,7 @@ def measured_along(scenario: ApproachScenario, listed: RunwayTable) -> tuple[App
     """Return an approach and the error along its course; None where it is not measured."""
     flight = simulate_approach(scenario).flight
     try:
-        answer = LANDING.run(flight, Known(flight_phases(flight), runways=listed), ASSUMED).answer
+        answer = LANDING.run(flight, Known(flight_phases(flight), find_runways=lambda: (listed, "")), ASSUMED).answer
     except NotAssessableError:
         return None
     found = [(one, error) for one in answer.approaches for error in one.along_errors if error.state == "measured"]

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import SettingsError
+from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.toml_settings import settings_from
 from groundstation.systems.health.answer import Check, Measure
 from groundstation.systems.health.checks import CHECKS, judge
 from groundstation.systems.health.evidence import Event, Evidence, Spans, in_the_air
-from groundstation.systems.health.limits import Limit, shipped, thresholds
+from groundstation.systems.health.limits import Limit, Threshold, shipped, thresholds
 from groundstation.systems.health.sentence_answer import told
 from groundstation.systems.health.settings import HealthSettings
 from groundstation.systems.known import Known
@@ -164,6 +165,13 @@ def test_settings_refuse_a_quantity_that_no_check_judges_and_limits_that_cross()
     assert settings_from(HealthSettings, {"thresholds": {"hdop": {"amber": 2.0}}}, "a.toml", "health").thresholds == {
         "hdop": Limit(amber=2.0)
     }
+
+
+def test_the_shipped_thresholds_hold_under_the_strict_rules_for_users() -> None:
+    tables = ShippedToml("groundstation.systems", "health", "thresholds").read("thresholds").table
+    strictly = {name: settings_from(Threshold, table, "thresholds.toml", name) for name, table in tables.items()}
+    assert strictly == shipped()
+    assert all(isinstance(one.red, float | None) for one in shipped().values())  # 5 in the file is 5.0
 
 
 def test_every_threshold_names_its_source_and_a_check() -> None:

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import SettingsError
-from groundstation.methods.ins_noise import BankFactors, Calibration, GnssNoise, load_class
+from groundstation.base.shipped_toml import ShippedToml
+from groundstation.base.toml_settings import settings_from
+from groundstation.methods.ins_noise import BankFactors, Calibration, GnssNoise, InsNoise, class_names, load_class
 from groundstation.systems.inertial.bank import NoiseBank, run_bank
 from groundstation.systems.inertial.coarse import COARSE_S, Coarse
 from groundstation.systems.inertial.estimate import estimate_ins_errors
@@ -156,6 +158,12 @@ def test_the_white_part_of_gnss_falls_with_the_samples_averaged() -> None:
     noise = GnssNoise(4.0, 3.0, 300.0, 0.2, 0.1, 60.0).averaged(16.0)
     assert (noise.position_white_m, noise.position_correlated_m) == (1.0, 3.0)
     assert (noise.velocity_white_mps, noise.velocity_correlated_mps) == (0.05, 0.1)
+
+
+@pytest.mark.parametrize("name", class_names())
+def test_the_shipped_classes_hold_under_the_strict_rules_for_users(name: str) -> None:
+    file = ShippedToml("groundstation.methods", "ins_classes", "ins_class").read(name)
+    assert load_class(name) == settings_from(InsNoise, {"name": name} | file.table, file.where)
 
 
 def test_a_class_file_may_leave_the_scales_of_other_models_out(tmp_path: Path) -> None:

@@ -50,6 +50,7 @@ RADII_SHARE = 2e-3  # the simulation leaves out that radii change with the latit
 LEFT_OUT_SHARE = 3e-4  # the same against the largest term of a row
 USED_SHARE = 0.999  # five sigmas of the gate, which white noise hardly leaves
 FOLLOWED_SIGMAS = 1.0  # an undisturbed estimate differs by what the disturbance made it forget: less than its sigma
+ROUNDING = 1e-9  # one part in a billion: the same sums in another order
 AS_GOOD_SHARE = 1.8  # what was learned of tilt and drift is kept, but for a minute of a velocity step not yet believed
 
 
@@ -560,6 +561,27 @@ def test_forecast_from_inside_a_gap_goes_on_as_the_filter_does() -> None:
     forecast = coupled_forecast.hindcast_coupled(run, at, np.array([600.0, 1200.0]), SETTINGS)[0]
     states = CHANNELS[:, POSITION]
     assert forecast == pytest.approx(run.x[[5900, 6500]][:, states] - run.x[5300, states], abs=1.0)
+
+
+def test_starts_carried_together_are_those_carried_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two starts on one raster of steps share their steps, one between does not, and few steps are held at once."""
+    motion, sensors = strapdown(5000.0, 2500.0)
+    truth = propagate(motion, sensors)
+    differences = differences_of(motion, truth.position_m[0], truth.velocity_mps[0])
+    run = coupled.run_coupled(differences, InsNoise(accelerometer_ug=50.0), SETTINGS)
+    at, lead_s = np.array([1000, 1300, 1937, 2200]), 60.0 * np.arange(1.0, 31.0)
+    (shared,) = coupled_forecast.steps_ahead(differences, run.noise, at[:2].astype(float), lead_s, 10.0)
+    assert len(shared.values) == 180 + 30 and shared.step.shape == (2, 180)
+
+    def found(one: Int64Array) -> FloatArray:
+        forecast = coupled_forecast.hindcast_coupled(run, one, lead_s, SETTINGS)
+        return np.stack([forecast, coupled_forecast.coupled_variance(run, one, lead_s)])
+
+    together = found(at)
+    monkeypatch.setattr(coupled_forecast, "STEPS_AT_ONCE", 1)
+    assert np.array_equal(found(at), np.concatenate([found(at[place : place + 1]) for place in range(4)], axis=1))
+    assert together == pytest.approx(found(at), rel=ROUNDING)
+    assert found(at[:0]).shape == (2, 0, 30, 2)
 
 
 def test_without_gnss_at_all_nothing_is_claimed() -> None:

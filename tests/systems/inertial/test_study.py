@@ -14,12 +14,21 @@ from groundstation.results.figures import FigureData
 from groundstation.results.forecast_methods import FORECAST_METHODS
 from groundstation.simulation.inertial_family import simulate_family
 from groundstation.systems import systems
+from groundstation.systems.inertial import coupled
+from groundstation.systems.inertial.coupled_forecast import StepsAhead
 from groundstation.systems.inertial.hindcast import Hindcast
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.study import forecast
 from groundstation.systems.inertial.study import tables as forecast_tables
 from groundstation.systems.inertial.study.cases import FIRST_SEED, NEW_ROUTES, FilterCase, epochs_of, study_cases
-from groundstation.systems.inertial.study.coupled_bank import LEAD_STEP_S, LEADS, SetForecasts, fly_bank
+from groundstation.systems.inertial.study.coupled_bank import (
+    LEAD_STEP_S,
+    LEADS,
+    VARIANCE_STEP_S,
+    SetForecasts,
+    fly_bank,
+    grown_variances,
+)
 from groundstation.systems.inertial.study.forecast import study_forecast
 from groundstation.systems.inertial.study.outages import fly_with_outages, outages_of
 from groundstation.systems.inertial.study.runs import (
@@ -267,3 +276,16 @@ def test_every_study_is_listed_and_no_other_is_run(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="one of heading, crew, installation, forecast"):
         study_to("weather", tmp_path / "out", runs=10, seed=1, force=False, listen=lambda event: None)
     assert not (tmp_path / "out").exists()
+
+
+def test_variance_carried_back_from_the_leads_is_that_carried_forward() -> None:
+    """Any entries of A, two starts, three sets of noise: sigma to rounding."""
+    rng = np.random.default_rng(4)
+    values = 1e-4 * rng.standard_normal((200, len(coupled.PATTERN)))
+    step = rng.integers(0, 200, (2, 10 * LEADS))
+    half = rng.standard_normal((3, 2, coupled.SIZE, coupled.SIZE))
+    P, densities = half @ np.swapaxes(half, 2, 3), rng.uniform(0.0, 1.0, (3, coupled.SIZE))
+    found = grown_variances(StepsAhead(slice(None), values, step, VARIANCE_STEP_S, 10), P, densities)
+    for place in range(3):
+        forward = coupled.RATES.variances(values, step, VARIANCE_STEP_S, 10, P[place], densities[place])
+        assert found[place] == pytest.approx(forward[:, :, coupled.CHANNELS[:, 0]], rel=1e-9)

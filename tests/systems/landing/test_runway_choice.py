@@ -70,7 +70,7 @@ def table(*rows: dict[str, object]) -> RunwayTable:
 def analysed(
     flight: object, listed: RunwayTable | None, where: SiteData | None = None, **settings: object
 ) -> Found[LandingResult]:
-    known = Known(flight_phases(flight), site=where or SiteData(), runways=listed)  # type: ignore[arg-type]
+    known = Known(flight_phases(flight), site=where or SiteData(), find_runways=lambda: (listed, ""))  # type: ignore[arg-type]
     return LANDING.run(flight, known, LandingSettings(**settings))  # type: ignore[arg-type]
 
 

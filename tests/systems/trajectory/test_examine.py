@@ -9,7 +9,7 @@ import groundstation
 from groundstation.base.records import Column
 from groundstation.pipeline.one_flight.analyse import known_of, run_analyses, seen_by_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.pipeline.verbs.usable import FLIGHT_PURPOSES, usability_of_flight
+from groundstation.pipeline.verbs.usable import flight_purposes, usability_of_flight
 from groundstation.simulation.imu.scenario import ImuScenario, fly
 from groundstation.simulation.imu.settings import ImuSettings
 from groundstation.simulation.imu.tables import write_csv
@@ -49,7 +49,7 @@ def told(flight: Flight) -> tuple[str, list[str]]:
     found = usability_of_flight("trajectory", flight, ORDINARY)
     if found.state == "no" and any(topic.startswith("imu") for topic in flight.topics()):
         seen = seen_by_analyses(flight, ORDINARY)
-        ran = run_analyses((FLIGHT_PURPOSES["trajectory"],), seen, known_of(seen, ORDINARY))
+        ran = run_analyses((flight_purposes()["trajectory"],), seen, known_of(seen, ORDINARY))
         assert ran.reasons["trajectory"] == found.shortfalls[0].text
     return found.state, [one.text for one in found.shortfalls]
 

@@ -10,31 +10,25 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.dataclasses import dataclass
-from groundstation.methods.kalman import filter as kalman
 from groundstation.results.figures import FigureData
 from groundstation.simulation.inertial_family import simulate_family
 from groundstation.systems.inertial.bank import JUDGED_S, TRUST
 from groundstation.systems.inertial.coarse import Coarse
 from groundstation.systems.inertial.coupled import (
     CHANNELS,
-    COLUMNS,
-    PATTERN,
     RATES,
-    ROWS,
     SIZE,
-    CoupledRun,
-    coupled_values,
-    lines_of,
+    coupled_matrix,
     noise_of,
     run_coupled,
 )
-from groundstation.systems.inertial.coupled_forecast import coupled_variance, hindcast_coupled
+from groundstation.systems.inertial.coupled_forecast import StepsAhead, coupled_variance, hindcast_coupled, steps_ahead
 from groundstation.systems.inertial.craft_motion import CraftMotion
 from groundstation.systems.inertial.differences import InsDifferences
 from groundstation.systems.inertial.filter import ChannelsRun, DifferenceEpochs, run_filter
 from groundstation.systems.inertial.hindcast import Hindcast
 from groundstation.systems.inertial.leads import PAST_FROM_S, built_up, past_mean, start_epochs
-from groundstation.systems.inertial.model import POSITION, RANDOM_DRIFT
+from groundstation.systems.inertial.model import POSITION
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.skill import QUANTILES, claimed_sigma
 from groundstation.systems.inertial.start_covariance import lead_growth
@@ -46,7 +40,6 @@ HORIZONS_MIN = (10.0, 30.0, 60.0, 90.0, 120.0)
 PRIOR_OF_CLASS = 0.5  # of the class's own filter, where it is one of the sets
 ALONE, WITH_CLASS = "bank", "bank and class"
 PLACES = CHANNELS[:, POSITION]
-DECAYS = np.array([PATTERN.index((row, row)) for row in CHANNELS[:, RANDOM_DRIFT]])
 
 
 @dataclass(frozen=True)
@@ -104,74 +97,66 @@ def set_forecasts(
 
     The noise sets are those of the bank of the INS class.
     """
-    coarse = Coarse.of(flown)
+    coarse, known = Coarse.of(flown), flown.epochs.position_m[replay.at]
     short = coarse_differences(differences, coarse)
     runs = [run_coupled(short, coarse.noise(noise), settings, every=1) for noise in flown.noise.bank.sets(flown.noise)]
-    noises = [noise_of(run.noise, run.differences, run.epochs, 0.0)[1] for run in runs]
+    last = np.maximum(np.searchsorted(coarse.end_s, replay.start_s + 1e-6, side="right") - 1, 0)
+    seconds = replay.start_s - coarse.epochs.time_s[last]
+    since = CraftMotion.over(differences, replay.start_s - seconds, seconds, is_strapdown=flown.noise.is_strapdown)
+    lead_s = LEAD_STEP_S * np.arange(1.0, LEADS + 1.0)
     shape = (len(runs), len(replay.start_s), LEADS, 2)
     mean, variance = np.zeros(shape), np.zeros(shape)
-    last = np.maximum(np.searchsorted(coarse.end_s, replay.start_s + 1e-6, side="right") - 1, 0)
-    for start, (start_s, epoch) in enumerate(zip(replay.start_s, last, strict=True)):
-        known = flown.epochs.position_m[replay.at[start]]
-        paths = [
-            _values(differences, start_s + step_s * np.arange(round(LEADS * LEAD_STEP_S / step_s) + 1.0), flown)
-            for step_s in (STEP_S, VARIANCE_STEP_S)
-        ]
-        seconds = float(start_s) - float(coarse.epochs.time_s[epoch])
-        since = _values(differences, np.array([start_s - seconds, start_s]), flown) if seconds > 1e-6 else None
-        carriers: dict[float, FloatArray] = {}  # by the decay of the random drift, which several sets share
-        for place, (run, densities) in enumerate(zip(runs, noises, strict=True)):
-            x, P = _at_start(run, int(epoch), since, seconds, densities)
-            x[PLACES], P[PLACES], P[:, PLACES] = known, 0.0, 0.0
-            beta = run.noise.beta_per_s
-            for values in paths:
-                values[:, DECAYS] = -beta
-            if beta not in carriers:
-                carriers[beta] = RATES.exponentials(paths[1], np.full(len(paths[1]), VARIANCE_STEP_S))
-            carried = RATES.carried(paths[0], STEP_S, round(LEAD_STEP_S / STEP_S), x)
-            mean[place, start] = carried[:, PLACES] - known
-            variance[place, start] = _grown(run, carriers[beta], P, densities)
+    for beta in {run.noise.beta_per_s for run in runs}:  # by the decay of the random drift, which several sets share
+        sets = [place for place, run in enumerate(runs) if run.noise.beta_per_s == beta]
+        noise, phi = runs[sets[0]].noise, _short_transitions(since, seconds, beta)
+        densities = np.array([noise_of(runs[place].noise, short, coarse.epochs, 0.0)[1] for place in sets])
+        x = np.stack([(phi @ runs[place].x[last, :, None])[..., 0] for place in sets])
+        P = np.stack([phi @ runs[place].P[last] @ phi.transpose(0, 2, 1) for place in sets])
+        P += densities[:, None, :, None] * np.eye(SIZE) * seconds[:, None, None]
+        x[:, :, PLACES], P[:, :, PLACES], P[:, :, :, PLACES] = known, 0.0, 0.0
+        for ahead in steps_ahead(differences, noise, replay.start_s, lead_s, STEP_S):
+            starts = x[:, ahead.starts]
+            steps = np.tile(ahead.step, (len(sets), 1))
+            carried = RATES.carried(ahead.values, steps, STEP_S, ahead.every, starts.reshape(-1, SIZE))
+            built = carried[:, :, PLACES].reshape(*starts.shape[:2], LEADS, 2)
+            mean[sets, ahead.starts] = built - known[ahead.starts, None]
+        for ahead in steps_ahead(differences, noise, replay.start_s, lead_s, VARIANCE_STEP_S):
+            variance[sets, ahead.starts] = grown_variances(ahead, P[:, ahead.starts], densities)
     return SetForecasts(mean, variance)
 
 
-def _values(differences: InsDifferences, time_s: FloatArray, flown: ChannelsRun) -> FloatArray:
-    motion = CraftMotion.between(differences, time_s, is_strapdown=flown.noise.is_strapdown)
-    return np.array(coupled_values(motion, flown.noise.beta_per_s))
+def _short_transitions(motion: CraftMotion, seconds: FloatArray, beta_per_s: float) -> FloatArray:
+    """Transitions over less than a coarse epoch, to the second order, shape (s, 16, 16)."""
+    A = coupled_matrix(motion, beta_per_s) * seconds[:, None, None]
+    return np.eye(SIZE) + A + 0.5 * A @ A
 
 
-def _at_start(
-    run: CoupledRun, epoch: int, since: FloatArray | None, seconds: float, densities: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the state of a set at an epoch, carried to a start so many seconds later.
+def grown_variances(ahead: StepsAhead, P: FloatArray, densities: FloatArray) -> FloatArray:
+    """Return the variance of the position at the leads for k sets, shape (k, s, l, 2).
 
-    ``since``, shape (1, 41), are the entries of A from the epoch to the start, None where it begins at the epoch.
+    The rows of the transition that lead to the positions are carried back from each lead to the start. They are the
+    same for all sets, and so is what they make of the noise of each state on the way.
+
+    Parameters
+    ----------
+    P : ndarray, shape (k, s, 16, 16)
+        Covariances at the starts.
+    densities : ndarray, shape (k, 16)
     """
-    x, P = np.array(run.x[epoch]), np.array(run.P[epoch])
-    if since is not None:
-        since[:, DECAYS] = -run.noise.beta_per_s
-        A = np.zeros((SIZE, SIZE))
-        A[ROWS, COLUMNS] = since[0] * seconds
-        phi = np.eye(SIZE) + A + 0.5 * A @ A
-        x, P = phi @ x, phi @ P @ phi.T + np.diag(densities) * seconds
-    return x, P
-
-
-def _grown(run: CoupledRun, exponentials: FloatArray, P: FloatArray, densities: FloatArray) -> FloatArray:
-    """Return the variance of the position at the leads, shape (l, 2).
-
-    ``exponentials`` are those of the steps there.
-    """
-    nothing = np.zeros(0, np.int64)
-    unseen = kalman.Measurements(nothing, np.zeros((0, 0)), nothing, lines_of(run.epochs, run.noise))
-    carried = kalman.run_filter(
-        RATES.with_noise(exponentials, np.full(len(exponentials), VARIANCE_STEP_S), densities),
-        np.arange(len(exponentials)),
-        unseen,
-        kalman.Start(np.zeros((SIZE, 0)), P),
-        kept=kalman.KeptArrays(states=False, covariances=False, gains=False, variances=True),
-    )
-    every = round(LEAD_STEP_S / VARIANCE_STEP_S)
-    return np.asarray(carried.record.variance[every - 1 :: every][:, PLACES])
+    count, steps = ahead.step.shape
+    F = RATES.matrices(ahead.values, np.full(len(ahead.values), ahead.step_s))
+    rows = np.zeros((count, LEADS, 2, SIZE))
+    rows[:, :, [0, 1], PLACES] = 1.0
+    entered = np.zeros_like(rows)
+    for k in range(steps - 1, -1, -1):
+        use = slice(k // ahead.every, None)  # leads that end behind the step
+        flat = rows[:, use].reshape(count, -1, SIZE)
+        back = flat @ F[ahead.step[:, k]]
+        entered[:, use] += 0.5 * ahead.step_s * (np.square(flat) + np.square(back)).reshape(rows[:, use].shape)
+        rows[:, use] = back.reshape(rows[:, use].shape)
+    flat = rows.reshape(count, -1, SIZE)
+    of_start = np.sum((flat @ P) * flat, axis=3).reshape(len(P), *rows.shape[:3])
+    return np.asarray(of_start + np.moveaxis(entered @ densities.T, 3, 0))
 
 
 @dataclass(frozen=True)
