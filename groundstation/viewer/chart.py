@@ -294,7 +294,7 @@ class Chart:
         style = rr.LineStrips2D.from_fields(colors=[colours.LIGHT], radii=screen_radius(CURSOR), draw_order=NOW)
         self.recorder.static(f"{self.path}/cursor", style)
         after = np.append(time_s, self.x.high + (time_s[1] - time_s[0]))
-        columns = rr.LineStrips2D.columns(strips=strips).partition([*[1] * len(strips), 0])
+        columns = rr.LineStrips2D.columns(strips=strips).partition([*[1] * len(strips), 0])  # type: ignore[arg-type]
         indexes = self.recorder.indexes(self.recorder.time_ns(after))
         self.recorder.stream.send_columns(f"{self.path}/cursor", indexes, columns)
 

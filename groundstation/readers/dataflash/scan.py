@@ -37,8 +37,9 @@ def magic_places(data: NDArray[np.uint8], magic: int = MAGIC_BYTES) -> NDArray[n
 
     The first is searched, which few other bytes are, and the second looked for behind it.
     """
-    places = np.flatnonzero(data[:-1] == magic & 0xFF)
-    return places[data[places + 1] == magic >> 8]
+    first = np.flatnonzero(data[:-1] == magic & 0xFF)
+    places: NDArray[np.int64] = first[data[first + 1] == magic >> 8]
+    return places
 
 
 @in_place
