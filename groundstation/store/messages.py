@@ -82,7 +82,6 @@ class ChunkMessages:
         """
         return np.ndarray((len(self),), dtype, self.buffer.data, int(self.starts[0]) + offset, (self.stride,))
 
-
     def is_alike(self, start: int, stop: int) -> bool:
         """Tell whether the bytes from ``start`` to ``stop`` of every record are those of the first.
 
