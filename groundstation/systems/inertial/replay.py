@@ -79,7 +79,7 @@ def plan_replay(run: ChannelsRun, settings: InertialSettings) -> ReplayPlan:
 def _judged(run: ChannelsRun, first_s: float, step_s: float, *horizons_min: float) -> list[int]:
     """Count the starts that GNSS could judge at some horizons."""
     shown = built_up(run.epochs, start_epochs(run.epochs, first_s, step_s), 60.0 * np.array(horizons_min))
-    return np.isfinite(shown).all(axis=2).sum(axis=0).tolist()
+    return [int(count) for count in np.isfinite(shown).all(axis=2).sum(axis=0)]
 
 
 def map_grid(run: ChannelsRun, settings: InertialSettings) -> tuple[Int64Array, FloatArray]:
