@@ -7,6 +7,7 @@ BIN    := $(VENV)/bin
 RUNTIME := $(VENV)/.runtime
 DEV     := $(VENV)/.dev
 SITE    := $(VENV)/.site
+MYPY_NUM_WORKERS ?= 2
 # Bytecode is kept: the tests start hundreds of processes. It comes with the first import, and only of what is imported.
 PIP     := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 unexport PYTHONDONTWRITEBYTECODE
@@ -45,10 +46,10 @@ test: $(DEV) ## the whole suite: tests and doctests
 check: $(DEV) ## in half a minute: format, lint, types, the import rules between rooms
 	@$(MAKE) --no-print-directory -j 2 types style
 
-types:
-	MYPY_NUM_WORKERS=2 $(BIN)/mypy
+types: $(DEV)
+	MYPY_NUM_WORKERS=$(MYPY_NUM_WORKERS) $(BIN)/mypy
 
-style:
+style: $(DEV)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/python -m pytest -q tests/test_architecture.py

@@ -17,7 +17,8 @@ from groundstation.reports.live import page_data
 from groundstation.reports.pdf import pdf_bytes
 from groundstation.reports.svg.boxes import TICK_PT, TO_TEXT_PT, TO_TITLE_PT, placed, widest
 from groundstation.reports.svg.colours import COLOURS
-from groundstation.reports.svg.font import LINE_SHARE, SIZE_PT
+from groundstation.reports.svg.font import LINE_SHARE, SIZE_PT, width_pt
+from groundstation.reports.svg.labels import labels_of
 from groundstation.reports.svg.path import dots, polyline
 from groundstation.reports.svg.picture import picture_of
 from groundstation.reports.svg.thinning import shown_rows
@@ -28,6 +29,7 @@ from tests.told import PLOTS
 NUMBER = re.compile(r"-?\d*\.?\d+")
 HOSTILE = '</text><script>alert("x")</script>]]> & \' \x00\x1b[2J\u202e\ud800 一' + "é" * 500
 SCALES: tuple[Scale, ...] = ("linear", "log", "symlog", "time", "angle", "date")
+LINES = ("amber", "red", "at most")
 NASTY = {
     "nothing": [],
     "one": [3.0],
@@ -366,3 +368,23 @@ def test_windows_of_panels_that_share_an_axis_stand_above_each_other() -> None:
     rows = (Row((above,), shares_x=True), Row((Panel([curve], axis, Axis("up")),)))
     upper, lower = placed(Plot("a", "A", "", "", rows))[0]
     assert [(box.left, box.right) for box in upper.boxes] == [(box.left, box.right) for box in lower.boxes]
+
+
+@pytest.mark.parametrize("is_upright", [False, True])
+@pytest.mark.parametrize("apart", [0.0, 0.05, 0.3, 3.0])
+def test_labels_of_lines_near_each_other_and_of_a_point_between_stand_clear(apart: float, is_upright: bool) -> None:
+    level = np.array([5.0 + apart * place for place in range(3)])
+    lines = [Limit(value=one, is_upright=is_upright, label=name) for one, name in zip(level, LINES, strict=True)]
+    point = Points(x=np.array([level[0] if is_upright else 6.6]), y=np.array([9.4 if is_upright else level[0]]))
+    marks = (*lines, replace(point, labels=("threshold",)))
+    plot = plot_of(*marks, x=Axis("x", "linear", 0.0, 20.0), y=Axis("y", "linear", 0.0, 20.0))
+    (box,) = [one for panel in placed(plot)[0] for one in panel.boxes]
+    found = labels_of(box)
+    assert [one.text for one in found] == [*LINES, "threshold"]
+    bounds = [(one.left, one.base - SIZE_PT, one.left + width_pt(one.text), one.base) for one in found]
+    for place, one in enumerate(bounds):
+        assert box.left <= one[0] and one[2] <= box.right and one[1] >= box.top and one[3] <= box.bottom
+        for other in bounds[:place]:
+            across, down = min(one[2], other[2]) - max(one[0], other[0]), min(one[3], other[3]) - max(one[1], other[1])
+            assert across <= 0.0 or down <= 0.0, (found[place].text, apart)
+    assert all(abs(one.y - one.base) < 3.0 for one in found[:3]) or is_upright, "a label stands at its own line"

@@ -8,9 +8,10 @@ from groundstation.base.dataclasses import dataclass
 from groundstation.plots.marks import Limit, Outlines, Points
 from groundstation.reports.svg.boxes import EDGE_PT, Box
 from groundstation.reports.svg.colours import COLOURS, FAINT
-from groundstation.reports.svg.font import SIZE_PT, label, middle, width_pt
+from groundstation.reports.svg.font import LINE_SHARE, SIZE_PT, label, middle, width_pt
 
 MOST_LABELS, MOST_OF_A_LABEL = 60, 24
+MOST_STEPS = 6  # of a label along its line, away from others
 LABEL_SHARE = 0.66  # of the width: where the label of a line across begins
 HALO_PT = 2.4  # of paper, about the letters
 Bounds = tuple[float, float, float, float]
@@ -33,11 +34,12 @@ class Label:
 
 def labels_of(box: Box) -> tuple[Label, ...]:
     """Return labels of lines across a frame, then those of points and outlines in it."""
-    return (*_beside_lines(box), *_at_places(box))
+    taken: list[Bounds] = []
+    return (*_beside_lines(box, taken), *_at_places(box, taken))
 
 
-def _beside_lines(box: Box) -> Iterator[Label]:
-    """Yield labels above level lines and right of upright ones."""
+def _beside_lines(box: Box, taken: list[Bounds]) -> Iterator[Label]:
+    """Yield labels above level lines and right of upright ones; of two that would meet the later one moves on."""
     for mark in box.panel.marks:
         if not isinstance(mark, Limit) or not mark.label:
             continue
@@ -47,14 +49,32 @@ def _beside_lines(box: Box) -> Iterator[Label]:
         if not low <= place <= high:
             continue
         if mark.is_upright:
-            base = box.top + SIZE_PT
+            base = _clear(place + 2.0, box.top + SIZE_PT, shown, taken, (0.0, LINE_SHARE * SIZE_PT), box)[1]
             yield Label(shown, colour, place, base, place + 2.0, base)
         else:
-            left = box.left + min(LABEL_SHARE * box.width, max(box.width - width_pt(shown) - 2.0, 0.0))
+            wide = width_pt(shown)
+            first = box.left + min(LABEL_SHARE * box.width, max(box.width - wide - 2.0, 0.0))
+            left = _clear(first, place - 2.0, shown, taken, (-wide - SIZE_PT, 0.0), box)[0]
             yield Label(shown, colour, left, place, left, place - 2.0)
 
 
-def _at_places(box: Box) -> Iterator[Label]:
+def _clear(
+    left: float, base: float, text: str, taken: list[Bounds], step: tuple[float, float], box: Box
+) -> tuple[float, float]:
+    """Return left end and base line of a label along its line, in steps, where no other stands; else the first."""
+    tries = [(left + number * step[0], base + number * step[1]) for number in range(MOST_STEPS)]
+    inside = [one for one in tries if one[0] >= box.left and one[1] <= box.bottom]
+    free = (one for one in inside if not any(_meet(_bounds(*one, width_pt(text)), other) for other in taken))
+    place = next(free, tries[0])
+    taken.append(_bounds(*place, width_pt(text)))
+    return place
+
+
+def _bounds(left: float, base: float, wide: float) -> Bounds:
+    return left, base - SIZE_PT, left + wide, base + 0.2 * SIZE_PT
+
+
+def _at_places(box: Box, taken: list[Bounds]) -> Iterator[Label]:
     wanted: list[tuple[float, float, str, str, bool]] = []
     for mark in box.panel.marks:
         if isinstance(mark, Points):
@@ -67,7 +87,6 @@ def _at_places(box: Box) -> Iterator[Label]:
                 if len(corners):
                     middle_x, middle_y = corners.mean(axis=0).tolist()
                     wanted.append((middle_x, middle_y, text, FAINT, True))
-    taken: list[Bounds] = []
     inside = [one for one in wanted if box.left <= one[0] <= box.right and box.top <= one[1] <= box.bottom and one[2]]
     for x, y, text, colour, is_middle in inside[:MOST_LABELS]:
         shown = label(text, MOST_OF_A_LABEL)
@@ -87,7 +106,7 @@ def _free(x: float, y: float, wide: float, taken: list[Bounds], box: Box, is_mid
         tries.insert(0, (x - 0.5 * wide, level))
     tries += [(x - 0.5 * wide, above - high), (x - 0.5 * wide, below + high)]
     tries += [(x + 3.0, above), (x - 3.0 - wide, above), (x + 3.0, below), (x - 3.0 - wide, below)]
-    bounds = [(left, base - high, left + wide, base + 0.2 * high) for left, base in tries]
+    bounds = [_bounds(*one, wide) for one in tries]
     is_free = [_inside(one, box) and not any(_meet(one, other) for other in taken) for one in bounds]
     place = is_free.index(True) if True in is_free else 0
     taken.append(bounds[place])
