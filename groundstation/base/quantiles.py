@@ -88,13 +88,18 @@ def _student_above(chance: float, freedom: float) -> float:
 
 
 def _student_in_tail(chance: float, freedom: float, log_density_at_0: float) -> float:
-    """Return the value by the power law of the tail, which it never exceeds: Newton's steps go down from there."""
+    """Return the value by the power law of the tail, which it never exceeds.
+
+    Newton's steps go down from there.
+    """
     log_value = (log_density_at_0 - math.log(chance) + 0.5 * (freedom - 1.0) * math.log(freedom)) / freedom
     return math.exp(log_value) if log_value < _LOG_OF_LARGEST else math.inf
 
 
 def normal_above(chance: float) -> float:
-    """Return the value that a standard normal one exceeds with a chance of more than 0 and at most a half.
+    """Return the value that a standard normal one exceeds with a chance.
+
+    That is more than 0 and at most a half.
 
     Source: Abramowitz and Stegun, Handbook of Mathematical Functions, 1964, eq. 26.2.23, to 5e-4, then Halley's steps.
 
@@ -194,9 +199,10 @@ def share_quantile(probability: float, successes: float, failures: float) -> flo
 
 
 def _share_below(share: float, a: float, b: float, probability: float) -> tuple[float, float]:
-    """Return the chance of a smaller share under a beta distribution, less a probability, and its slope.
+    """Return the chance of a smaller share, less a probability, and its slope.
 
-    The weight x**a (1 - x)**b / B(a, b) is taken about its top, where no large logarithms cancel.
+    The shares have a beta distribution. The weight x**a (1 - x)**b / B(a, b) is taken about its top, where no large
+    logarithms cancel.
 
     Source: Loader, Fast and accurate computation of binomial probabilities, 2000.
     """
@@ -213,7 +219,10 @@ def _share_below(share: float, a: float, b: float, probability: float) -> tuple[
 
 
 def _log_ratio(value: float, top: float, beyond: float) -> float:
-    """Return the logarithm of one value over another, by their difference where they are close."""
+    """Return the logarithm of one value over another.
+
+    It is taken of their difference where they are close.
+    """
     if abs(beyond) < 0.5 * top:
         return math.log1p(beyond / top)
     return math.log(value / top) if value else -math.inf
@@ -261,10 +270,10 @@ def length_quantile(probability: float, length: float, sigma: float) -> float:
 
 
 def _share_within(length: float, true: float) -> float:
-    """Return the chance that a vector with noise of 1 in each component is no longer than ``length``.
+    """Return the chance that a noisy vector is no longer than ``length``.
 
-    The integral over the component across is one over the angle of a smooth function of period pi, or of one that ends
-    at nothing: sums at even steps give it to rounding.
+    Its noise is 1 in each component. The integral over the component across is one over the angle of a smooth function
+    of period pi, or of one that ends at nothing: sums at even steps give it to rounding.
     """
     half = math.asin(min(1.0, _BEYOND / length)) if length else 0.0
     total = 0.0
