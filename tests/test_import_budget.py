@@ -76,6 +76,11 @@ def test_a_purpose_is_answered_without_estimating() -> None:
     assert loaded(BY_VERB, *asked, names=names) == []
 
 
+def test_a_trajectory_without_an_imu_is_refused_without_scipy() -> None:
+    refused = BY_VERB.replace("not stop.code", "stop.code == 4")
+    assert loaded(refused, "check", str(SAMPLE), "--for", "trajectory", names=("scipy", "cattrs")) == []
+
+
 def test_a_log_is_opened_without_what_it_does_not_need() -> None:
     assert loaded(BY_OPEN, str(SAMPLE), names=(*NOT_NEEDED, "pyarrow.csv", "typer")) == []
 
