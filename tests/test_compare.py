@@ -45,7 +45,7 @@ from tests.saved import load
 from tests.systems.inertial.example import inertial_result
 from tests.told import COMPARED, comparison_html, write_comparison
 from tests.viewer_example import make_flight, make_results
-from tests.viewer_shots import ALL_OR_SOME, chosen, colourful, pages, picture
+from tests.viewer_shots import ALL_OR_SOME, chosen, colourful, drawn_in, pages
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 SCENARIOS = Path(__file__).parents[1] / "groundstation" / "simulation" / "scenarios"
@@ -506,8 +506,8 @@ def test_views_of_the_recording_draw_both(
     write_comparison(tmp_path / "x.rrd", comparison, a, b)
     client = headless_viewer(tmp_path / "x.rrd")
     drawn = {
-        view.name: colourful(picture(client.take_screenshot(view.view_id)))
-        for _, views in pages(client)
+        view.name: drawn_in(client, view.view_id, colourful, LEAST_PIXELS)
+        for _, views in pages(client, at_rest=False)
         for view in chosen([view for view in views if view.view_class != "TextDocument"], is_every)
     }
     assert [name for name, pixels in drawn.items() if pixels <= LEAST_PIXELS] == []

@@ -132,6 +132,21 @@ def settled(client: ViewerClient, view_id: str | None = None, max_size: int | No
     raise TimeoutError("the picture did not come to rest")
 
 
+def drawn_in(client: ViewerClient, view_id: str, measure: Callable[[np.ndarray], int], enough: int = -1) -> int:
+    """Number of pixels that a view of the page drew; it is shot again until they are more than enough, PATIENCE_S long.
+
+    The first pictures of a page may show an empty grid.
+    """
+    deadline = time.monotonic() + PATIENCE_S
+    while True:
+        try:
+            drawn = measure(picture(client.take_screenshot(view_id)))
+        except ConnectionError:  # the page does not show it yet
+            drawn = -1
+        if drawn > enough or time.monotonic() > deadline:
+            return drawn
+
+
 def chosen(views: Sequence[View], is_every: bool) -> list[View]:
     """Views of a page to take pictures of: every one, or of each class the first."""
     return list(views) if is_every else list({view.view_class: view for view in reversed(views)}.values())

@@ -88,7 +88,7 @@ def has_words_and_ends(plot: Plot, panel: Panel, windows: list[Axes]) -> None:
 
 def texts_have_room(figure: Figure, where: str) -> None:
     """Check that no text is cut at the edges and that none meets another; labels of points apart."""
-    FigureCanvasAgg(figure).draw()
+    figure.draw_without_rendering()
     width, height = figure.bbox.width, figure.bbox.height
     boxes = [(text.get_text(), text.get_window_extent()) for text in texts_of(figure)]
     for text, box in boxes:
@@ -108,7 +108,7 @@ def test_every_mark_stands_on_every_scale_and_draws_nothing_where_it_is_empty(na
     is_there(mark, axes, name)
     nothing = empty(mark)
     assert nothing is not None
-    figure_of(plot_of(nothing, y=Axis("up", "linear" if scale == "time" else scale)))._repr_png_()
+    figure_of(plot_of(nothing, y=Axis("up", "linear" if scale == "time" else scale))).draw_without_rendering()
 
 
 @pytest.mark.parametrize("name", [name for name in DRAWN if "limit" not in name])

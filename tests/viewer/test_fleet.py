@@ -24,7 +24,7 @@ from groundstation.viewer.fleet_density import MOST_STEPS, PATH, SO_FAR, steps
 from tests.fleet_example import save_flight, skill
 from tests.recording_contents import Contents
 from tests.told import write_fleet_recording
-from tests.viewer_shots import ALL_OR_SOME, chosen, colourful, pages, picture
+from tests.viewer_shots import ALL_OR_SOME, chosen, colourful, drawn_in, pages
 
 STEADY, STEPPING, HOSTILE = "A12", "B3", "![x](http://127.0.0.1/x)|<b>/../"
 FLIGHTS, NEW_LEVEL = 48, 27  # the flight from which on B3 is 1 deg off
@@ -329,14 +329,14 @@ def test_views_of_every_tab_draw_and_complain_of_nothing(
     client.set_time("flight_number", sequence=FLIGHTS // 2)
     seen = []
     seen_views = set()
-    for name, views in pages(client):
+    for name, views in pages(client, at_rest=False):
         seen.append(name)
         for view in chosen(views, is_every):
             if view.view_id in seen_views:  # stands on several pages
                 continue
             seen_views.add(view.view_id)
             kind = view.view_class
-            pixels = picture(client.take_screenshot(view.view_id))  # the page has come to rest
-            assert kind not in DRAWN_IN_COLOUR or colourful(pixels) > LEAST_PIXELS, (name, kind)
+            enough = LEAST_PIXELS if kind in DRAWN_IN_COLOUR else -1
+            assert drawn_in(client, view.view_id, colourful, enough) > enough, (name, kind)
         assert not [view.reports for view in client.get_state().views if view.reports], name
     assert [tab for tab in ("Fleet", "Aircraft", "Forecast", "Flights", "Failed") if any(tab in one for one in seen)]

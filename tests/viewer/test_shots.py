@@ -1,6 +1,5 @@
 """The real viewer, headless: every view of every tab draws the flight, and complains of nothing."""
 
-import time
 from collections.abc import Callable, Set
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from groundstation.tables.table import Flight
 from groundstation.viewer.recorder import Recorder
 from tests.told import send_flight, stream_recording
 from tests.viewer_example import make_flight, make_results
-from tests.viewer_shots import ALL_OR_SOME, PATIENCE_S, chosen, colourful, open_recording, pages, picture
+from tests.viewer_shots import ALL_OR_SOME, chosen, colourful, drawn_in, open_recording, pages
 
 pytestmark = pytest.mark.viewer
 
@@ -81,8 +80,7 @@ def _shots(
 ) -> dict[str, tuple[str, int]]:
     """What each view that is wanted drew: view id -> page and title, number of coloured or of bright pixels.
 
-    A view is shot again until it drew what is ``enough`` for it, and for at most ``PATIENCE_S``: the first pictures of
-    a page may show an empty grid. A view that stands on several pages is taken once.
+    A view is shot again until it drew what is ``enough`` for it. A view that stands on several pages is taken once.
     """
     shots: dict[str, tuple[str, int]] = {}
     for page, views in pages(client, at_rest=False):
@@ -90,14 +88,7 @@ def _shots(
             if view.view_id in shots or view.view_id not in wanted:
                 continue
             measure = colourful if view.view_class in DRAWN_IN_COLOUR else _brightness
-            deadline = time.monotonic() + PATIENCE_S
-            while True:
-                try:
-                    drawn = measure(picture(client.take_screenshot(view.view_id)))
-                except ConnectionError:  # the page does not show it yet
-                    drawn = -1
-                if drawn > enough.get(view.view_id, -1) or time.monotonic() > deadline:
-                    break
+            drawn = drawn_in(client, view.view_id, measure, enough.get(view.view_id, -1))
             shots[view.view_id] = (f"{page}: {view.name} ({view.view_class})", drawn)
     return shots
 

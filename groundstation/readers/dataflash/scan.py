@@ -37,9 +37,8 @@ def magic_places(data: NDArray[np.uint8], magic: int = MAGIC_BYTES) -> NDArray[n
 
     The first is searched, which few other bytes are, and the second looked for behind it.
     """
-    first = np.flatnonzero(data[:-1] == magic & 0xFF)
-    places: NDArray[np.int64] = first[data[first + 1] == magic >> 8]
-    return places
+    places = np.flatnonzero(data[:-1] == magic & 0xFF)
+    return np.asarray(places[data[places + 1] == magic >> 8])
 
 
 @in_place

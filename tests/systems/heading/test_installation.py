@@ -362,7 +362,10 @@ def test_whole_that_does_not_decide_refuses_nothing() -> None:
 # Families
 
 
-@pytest.mark.parametrize("name", ["stored, azimuth, METAR", "gyrocompass", "replaced, not told", "turned", "stand"])
+OFTEN, LONG = ("gyrocompass", "replaced, not told"), ("stored, azimuth, METAR", "turned", "stand")
+
+
+@pytest.mark.parametrize("name", [*OFTEN, *(pytest.param(one, marks=pytest.mark.slow) for one in LONG)])
 def test_intervals_hold_the_truth_of_small_fleets(name: str) -> None:
     """20 aircraft of 6 flights each: 0.85 is 4.5 binomial sigmas below 0.95, and lets one told-of flight in six go."""
     number = [family.name for family in FAMILIES].index(name)

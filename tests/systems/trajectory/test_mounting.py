@@ -174,17 +174,24 @@ def test_nothing_to_look_at(count: int) -> None:
 # Refused
 
 
-@pytest.mark.parametrize("axis", ["x", "y", "z"])
-@pytest.mark.parametrize("family", EVERY)
+@pytest.mark.parametrize(
+    ("family", "axis"),
+    [
+        pytest.param(family, axis, marks=() if axis == often else pytest.mark.slow)
+        for family, often in zip(EVERY, "xyz", strict=True)
+        for axis in "xyz"
+    ],
+)
 def test_mirrored_axis_is_refused(family: Family, axis: str) -> None:
     mounting = found(simulated(family, mounting=SimulatedMounting(mirrored=axis)), family)  # type: ignore[arg-type]
     assert mounting.source == "refused" and LEFT_HANDED in mounting.refused
 
 
+@pytest.mark.parametrize("every", [12, pytest.param(4, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("family", EVERY)
-def test_swapped_axes_of_both_sensors_are_refused(family: Family) -> None:
+def test_swapped_axes_of_both_sensors_are_refused(family: Family, every: int) -> None:
     imu, gnss = simulated(family)
-    for mirror in MIRRORS[::4]:
+    for mirror in MIRRORS[::every]:
         assert LEFT_HANDED in found((turned(imu, mirror), gnss), family).refused
 
 
