@@ -79,6 +79,27 @@ def to_tables(path: Path, *, is_surveyed: bool = True) -> int:
     return sum(len(table) for topic, table in flight.tables.items() if topic.startswith("raw."))
 
 
+def least_work(path: Path) -> None:
+    """Find the records, copy each of their fields once, and go once over its numbers.
+
+    No canonical field is made and nothing is counted: tables with a ledger cannot take less in numpy.
+    """
+    for block in Scanner(Source(path)):
+        for definition, which in block.groups():
+            records = block.records(definition, which)
+            for spec in definition.fields:
+                values = np.ascontiguousarray(records[spec.name])
+                if values.dtype.kind in "iuf" and values.ndim == 1:
+                    np.maximum.reduce(values)
+
+
+def surveyed(path: Path) -> None:
+    """Do what convert does before it writes: read, make the ledger, bring the records in order of time."""
+    items = list(read(Source(path)))
+    for _batch in corrected(items, survey(items).clock):
+        pass
+
+
 def by_pymavlink(path: Path, values: bool) -> int:
     """Take every message of a log; with its ``values``, or without a look at them."""
     from pymavlink.DFReader import DFReader_binary
@@ -129,6 +150,8 @@ def report(book: Book, path: Path, folder: Path, rounds: int) -> None:
         "to tables": lambda: to_tables(path),
         "convert": new_each_time(lambda: convert_log(open_log(path), target), target),
         "broken": lambda: to_tables(broken),
+        "least": lambda: least_work(path),
+        "surveyed": lambda: surveyed(path),
     }
     repeats = dict.fromkeys(works, REPEATS)
     has_peer = book.has("pymavlink")
@@ -151,9 +174,13 @@ def beside_pymavlink(book: Book, log: str, times: dict[str, Times]) -> None:
         ("tables alone", "to tables without ledger", None),
         ("to tables", "to tables with ledger", TABLES_GOAL),
         ("convert", "to MCAP", CONVERT_GOAL),
+        ("least", "limit: records found, fields copied and gone over once", None),
+        ("surveyed", "limit: read, ledger made, nothing written", None),
     ):
         for peer, told, limit in (("bare", "recv_msg", goal), ("values", "recv_msg with its values", None)):
             given = {"goal": limit, "is_times": True, "distribution": "pymavlink"}
+            if peer == "values" and work in ("least", "surveyed"):
+                continue
             book.against(f"{log} {what}", times[work], times[peer], f"pymavlink {told}", **given)
 
 

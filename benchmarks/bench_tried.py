@@ -26,6 +26,7 @@ from benchmarks.bench_verbs import LOGS_OF
 from benchmarks.record import ROUNDS, Book, by_turns
 from benchmarks.recorded import are_here
 from groundstation.base.records import RecordBatch
+from groundstation.pipeline.many_flights.processes.workers import TASKS_PER_PROCESS
 from groundstation.pipeline.verbs.provenance import CHECKOUT
 from groundstation.store.reader import read
 from groundstation.tables.assemble import flight_from_batches
@@ -66,7 +67,7 @@ def workers(book: Book) -> None:
         for name, context in sides.items():
             seen[name].append(clock_of_a_worker(context))
     for name, seconds in seen.items():
-        note = "a worker starts once in 32 flights with recordings, in 512 without" if name == "spawned" else ""
+        note = f"one in {TASKS_PER_PROCESS} flights" if name == "spawned" else ""
         book.figure(f"a worker is ready, {name}", seconds, "s by the clock", note=note)
 
 

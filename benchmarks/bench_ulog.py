@@ -17,6 +17,8 @@ import numpy as np
 from benchmarks.record import ROUNDS, Book, Goal, by_turns
 from benchmarks.recorded import LOGS, are_here
 from groundstation.base.records import Column, RecordBatch
+from groundstation.integrity.ordering import corrected
+from groundstation.integrity.survey import survey
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.readers import registry
@@ -36,6 +38,13 @@ def tables_of(path: Path) -> dict[str, dict[str, Column]]:
         if isinstance(item, RecordBatch):
             parts.setdefault(item.topic, []).append(item)
     return {topic: {name: _joined(name, several) for name in several[0].columns} for topic, several in parts.items()}
+
+
+def surveyed(path: Path) -> None:
+    """Do what convert does before it writes: read, make the ledger, bring the records in order of time."""
+    items = list(registry.read(path))
+    for _batch in corrected(items, survey(items).clock):
+        pass
 
 
 def _joined(name: str, batches: list[RecordBatch]) -> Column:
@@ -107,6 +116,7 @@ def measure(book: Book, paths: dict[str, Path], target: Path) -> None:
         path = paths[name]
         works[f"{name} tables"] = lambda path=path: tables_of(path)  # type: ignore[misc]
         works[f"{name} convert"] = lambda path=path: convert_log(open_log(path), target)  # type: ignore[misc]
+        works[f"{name} surveyed"] = lambda path=path: surveyed(path)  # type: ignore[misc]
         if has_peer:
             from pyulog import ULog
 
@@ -122,6 +132,8 @@ def measure(book: Book, paths: dict[str, Path], target: Path) -> None:
             book.against(convert, times[f"{name} convert"], peer, "pyulog", note="two threads, both counted")
             by_clock = {"goal": CONVERT_GOAL, "by_clock": True}
             book.against(f"{convert}, by the clock", times[f"{name} convert"], peer, "pyulog", **by_clock)
+            limit = f"ULog of {size} limit: read, ledger made, nothing written, by the clock"
+            book.against(limit, times[f"{name} surveyed"], peer, "pyulog", by_clock=True)
         memory(book, paths[name], size, has_peer=has_peer)
     what = f"ULog damaged every {DAMAGE_EVERY} bytes to tables"
     book.against(what, times["damaged tables"], times["whole tables"], "the good log", goal=DAMAGED_GOAL)

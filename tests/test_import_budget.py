@@ -55,6 +55,11 @@ def test_a_table_is_read_without_what_it_does_not_need(verb: str, tmp_path: Path
     assert loaded(BY_VERB, verb, str(SAMPLE), *target, names=names) == []
 
 
+@pytest.mark.parametrize("words", [("profile", "list"), ("runways", "show", "ENGM")])
+def test_a_verb_of_a_group_is_called_without_pydantic(words: tuple[str, ...]) -> None:
+    assert loaded(BY_VERB, *words, names=("pydantic", "rich", "importlib.metadata", "scipy", "numba")) == []
+
+
 def test_what_applies_to_a_log_is_told_without_an_mcap_of_it() -> None:
     CliRunner().invoke(app, ["list", str(SAMPLE)])  # compiles, where that was not done before
     names = ("groundstation.store.writer", "cattrs", "html")
@@ -109,7 +114,8 @@ def test_a_run_and_its_report_do_without_pandas(verb: str, tmp_path: Path) -> No
     run = ["run", str(SAMPLE), "-o", str(out), "-q", "-j", "1", "--no-pdf"]
     assert CliRunner().invoke(app, run).exit_code == 0  # compiles, where that was not done before
     again = {"run": [*run, "--redo"], "report": ["report", str(out), "-q"]}[verb]
-    assert loaded(BY_VERB, *again, names=("pandas", "numba", "scipy.linalg", "scipy.optimize")) == []
+    names = ("pandas", "numba", "scipy.linalg", "scipy.optimize", "pydantic", "urllib.request")
+    assert loaded(BY_VERB, *again, names=names) == []
 
 
 def test_pandas_is_found_by_everybody_but_pyarrow_in_its_first_look() -> None:

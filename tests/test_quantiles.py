@@ -3,6 +3,7 @@
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 from scipy import special, stats
 
@@ -11,6 +12,7 @@ from groundstation.base.quantiles import (
     chi_square_quantile,
     length_quantile,
     normal_above,
+    normal_below,
     share_quantile,
     student_quantile,
 )
@@ -65,6 +67,25 @@ def test_students_quantile_of_endless_freedom_is_the_normal_one() -> None:
 @pytest.mark.parametrize("chance", [1e-300, 1e-30, 1e-9, *CHANCES, 0.499])
 def test_normal_quantile_is_that_of_scipy(chance: float) -> None:
     assert normal_above(chance) == pytest.approx(-float(special.ndtri(chance)), rel=1e-12)
+
+
+@pytest.mark.parametrize("failures", [0.5, 1.0, 1.5, 3.0, 14.0, 99.5, 5e3, 1e6])
+@pytest.mark.parametrize("successes", [0.5, 1.0, 2.0, 16.0, 300.0, 1e5])
+def test_share_quantile_is_that_of_scipy(successes: float, failures: float) -> None:
+    for probability in (1e-6, 0.001, 0.025, 0.3, 0.5, 0.9, 0.975, 0.999):
+        expected = float(special.betaincinv(successes, failures, probability))
+        assert share_quantile(probability, successes, failures) == pytest.approx(expected, rel=1e-9)
+
+
+def test_share_quantile_at_its_ends() -> None:
+    assert [share_quantile(one, 3.0, 2.0) for one in (0.0, 1.0)] == [0.0, 1.0]
+    assert all(math.isnan(share_quantile(0.5, *one)) for one in ((0.0, 1.0), (1.0, math.nan), (1.0, math.inf)))
+
+
+def test_chances_below_normal_values_are_those_of_scipy() -> None:
+    z = np.array([-30.0, -8.0, -1.0, 0.0, 1e-9, 2.5, 9.0, math.inf, -math.inf])
+    assert normal_below(z) == pytest.approx(special.ndtr(z), rel=1e-13)
+    assert normal_below(z[:0]).tolist() == []
 
 
 @pytest.mark.parametrize("length", [0.0, 1e-6, 0.02, 0.1, 0.5, 1.6, 2.0, 6.0, 30.0, 200.0, 2e4])

@@ -10,7 +10,6 @@ import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import cache, cached_property
-from importlib.util import find_spec
 from itertools import count
 from pathlib import Path
 from types import FunctionType
@@ -19,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.dataclasses import dataclass
+from groundstation.base.installed import installed_version
 from groundstation.base.own_files import read_own, write_own
 
 INTEGER, NUMBER = "integer", "number"
@@ -130,28 +130,6 @@ def plain_forms(forms: Sequence[Form]) -> Iterator[str | tuple[str, int]]:
             yield from plain_forms(form.parts)
         else:
             yield form
-
-
-@cache
-def installed_version(package: str) -> str:
-    """Return the version of an installed package, by the name of the folder of its metadata.
-
-    ``importlib.metadata`` reads that folder; importing it takes longer than finding and linking a loop.
-
-    Examples
-    --------
-    >>> import numba
-    >>> installed_version("numba") == numba.__version__
-    True
-    """
-    spec = find_spec(package)
-    beside = Path(spec.origin).parent.parent.glob(f"{package}-*.dist-info") if spec and spec.origin else ()
-    versions = [found.name.removeprefix(f"{package}-").removesuffix(".dist-info") for found in beside]
-    if len(versions) == 1:
-        return versions[0]
-    from importlib.metadata import version
-
-    return version(package)
 
 
 def digest_of(function: Callable[..., Any], forms: Sequence[Form]) -> bytes:

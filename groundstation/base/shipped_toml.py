@@ -16,7 +16,10 @@ SUFFIX = ".toml"
 
 @dataclass(frozen=True)
 class TomlFile:
-    """TOML file: name without suffix, its name in errors, its table and its text, and whether it came with us."""
+    """TOML file: name without suffix, its name in errors, its table and its text.
+
+    ``is_shipped`` tells whether it came with the package.
+    """
 
     name: str
     where: str

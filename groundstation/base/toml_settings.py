@@ -124,11 +124,13 @@ def trusted(cls: type[Settings], table: Mapping[str, Any]) -> Settings:
     >>> trusted(Wind, {"north_mps": 3, "levels_m": [10.0]})
     Wind(north_mps=3.0, levels_m=(10.0,))
     """
-    hints = _hints(cls)
+    hints = _hints(cls)  # type: ignore[arg-type]  # a class can be hashed
     return cls(**{name: _trusted(hints[name], value) for name, value in table.items()})
 
 
-_hints = cache(typing.get_type_hints)
+@cache
+def _hints(cls: type[Any]) -> dict[str, Any]:
+    return typing.get_type_hints(cls)
 
 
 def _trusted(kind: Any, value: Any) -> Any:

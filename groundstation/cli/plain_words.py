@@ -5,6 +5,7 @@ From 0.29 on Typer has pydantic convert every one of them, also those that are l
 """
 
 import os
+import re
 from functools import partial
 from pathlib import Path
 from types import NoneType, UnionType
@@ -12,6 +13,8 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import typer.core
 from typer.models import ParameterInfo
+
+_DIGITS = re.compile("[0-9]{1,9}")  # a whole number that every parser reads alike
 
 
 class _OtherError(Exception):
@@ -26,10 +29,18 @@ class PlainWords(typer.core.TyperCommand):
         return with_plain_words(self.callback, super().get_params(ctx))
 
 
+class PlainGroup(typer.core.TyperGroup):
+    """Group of verbs whose own options are taken as they stand."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Return the parameters, with that of the help."""
+        return with_plain_words(self.callback, super().get_params(ctx))
+
+
 def with_plain_words(callback: Any, parameters: list[Any]) -> list[Any]:
     """Return parameters of a verb, or of the application, that take plain words as they stand."""
     if others := [one for one in parameters if "process_value" not in vars(one)]:
-        hints = get_type_hints(callback, include_extras=True)
+        hints = get_type_hints(callback, include_extras=True) if callback else {}
         for one in others:
             kind, *about = get_args(hints.get(one.name)) or (None,)
             info = next((each for each in about if isinstance(each, ParameterInfo)), ParameterInfo())
@@ -70,11 +81,20 @@ def plain(value: Any, kind: Any, about: ParameterInfo, *, is_list: bool = False)
         return [plain(one, get_args(kind)[0], about) for one in value]
     if get_origin(kind) is Literal and value in get_args(kind):
         return value
-    if kind in (str, bool, int, float) and type(value) is kind:  # of a number only the default: our own
+    if kind in (str, bool, int, float) and type(value) is kind:
         return value
+    if kind in (int, float) and isinstance(value, str) and _DIGITS.fullmatch(value):
+        return _within(kind(value), about)
     if kind is Path and isinstance(value, str | Path) and not _is_checked(value, about):
         return Path(value)
     raise _OtherError
+
+
+def _within(number: float, about: ParameterInfo) -> float:
+    """Return a number that the limits of its parameter allow."""
+    if (about.min is not None and number < about.min) or (about.max is not None and number > about.max):
+        raise _OtherError
+    return number
 
 
 def _is_checked(path: str | Path, about: ParameterInfo) -> bool:

@@ -96,10 +96,12 @@ class ClockModel:
         for name in ("starts", "offsets_ns", "placed_index", "placed_ns", "stray_index"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
-    @property
-    def is_shift(self) -> bool:
-        """Tell whether corrected time is device time and one offset, for every record."""
-        return len(self.starts) == 1 and not len(self.placed_index)
+    def is_shift(self, first: int, last: int) -> bool:
+        """Tell whether corrected time is device time and the one offset of all, for records of such places."""
+        if len(self.starts) > 1:
+            return False
+        low, high = self.placed_index.searchsorted((first, last + 1))
+        return bool(low == high)
 
     def time_ns(self, record_index: Int64Array, device_time_ns: Column, out: Int64Array | None = None) -> Int64Array:
         """Corrected time, nanoseconds, shape (n,), of records given by place and device time.
@@ -108,6 +110,8 @@ class ClockModel:
         """
         time = np.add(device_time_ns.values, self._offset_ns(record_index), out=out)
         if not len(self.placed_index) or not len(record_index):
+            return np.asarray(time, dtype=np.int64)
+        if self.placed_index[-1] < record_index.min() or self.placed_index[0] > record_index.max():
             return np.asarray(time, dtype=np.int64)
         if (record_index[1:] <= record_index[:-1]).any():
             at = np.minimum(np.searchsorted(self.placed_index, record_index), len(self.placed_index) - 1)

@@ -83,8 +83,9 @@ class ReferenceField:
 
     def serves(self, batch: RecordBatch) -> bool:
         """Tell whether the batch has the fields."""
-        wanted = {name for name in (self.field, self.week) if name}
-        return fnmatchcase(batch.topic, self.topic) and wanted.issubset(batch.columns)
+        if self.field not in batch.columns or (self.week and self.week not in batch.columns):
+            return False
+        return fnmatchcase(batch.topic, self.topic)
 
 
 @dataclass(frozen=True)

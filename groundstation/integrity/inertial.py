@@ -1,5 +1,6 @@
 """Count of the samples of an inertial unit at the end of its range, batch by batch."""
 
+import math
 from dataclasses import field
 
 import numpy as np
@@ -40,20 +41,21 @@ class _End:
             return False
         return True
 
-    def add(self, values: FloatArray, most: float) -> None:
+    def add(self, values: FloatArray, most: float, *, is_low: bool = False) -> None:
+        """Count the samples at the largest value, ``most`` of these; of values below zero where ``is_low``."""
         if most > self.value * (1.0 + SAME):
             self.value, self.count, self.run = most, 0, 0
-        is_end = values >= self.value * (1.0 - SAME)
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], is_end, [False])).astype(np.int8)))
-        starts, ends = edges[::2], edges[1::2]
+        least = self.value * (1.0 - SAME)
+        rows = np.flatnonzero(values <= -least if is_low else values >= least)  # few, mostly
+        borders = np.flatnonzero(np.diff(rows) > 1)
+        starts, ends = rows[np.concatenate(([0], borders + 1))], rows[np.concatenate((borders, [-1]))] + 1
         for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
             before = self.run if start == 0 else 0
             length = before + end - start
             if length >= FEWEST_ALIKE:
                 self.count += length - (before if before >= FEWEST_ALIKE else 0)
-        self.run = (self.run if len(starts) and starts[0] == 0 and ends[0] == len(values) else 0) + (
-            len(values) - int(starts[-1]) if is_end[-1] else 0
-        )
+        goes_through = starts[0] == 0 and ends[0] == len(values)
+        self.run = (self.run if goes_through else 0) + (len(values) - int(starts[-1]) if ends[-1] == len(values) else 0)
 
 
 @dataclass
@@ -82,6 +84,8 @@ class InertialTally:
                     self._clipped[name] = self._clipped.get(name, 0) + int(((column.values > 0) & column.mask).sum())
                 continue
             values = _rate_of(name, column, batch)
+            if values is not None and not math.isfinite(values.max(initial=0.0) - values.min(initial=0.0)):
+                values = values[np.isfinite(values)]
             if values is not None and len(values):
                 least = LEAST_RATE_DPS if name.startswith(("rate", "delta_angle")) else LEAST_ACCEL_MPS2
                 high, low = self._ends.setdefault(name, (_End(least), _End(least)))
@@ -89,7 +93,7 @@ class InertialTally:
                 if high.reaches(most):
                     high.add(values, most)
                 if low.reaches(-lowest):
-                    low.add(-values, -lowest)
+                    low.add(values, -lowest, is_low=True)
 
     def at_end(self, name: str) -> int:
         """Return how many samples of a field met the end of the range."""
@@ -100,7 +104,7 @@ class InertialTally:
 def _rate_of(name: str, column: Column, batch: RecordBatch) -> FloatArray | None:
     """Return rates in degrees per second, or specific force; None of another field.
 
-    Those of increments are means over their interval.
+    Those of increments are means over their interval; they need not be finite.
     """
     if name.startswith(("rate_", "accel_")):
         values = column.values if column.present is None else column.values[column.present]
@@ -116,5 +120,4 @@ def _rate_of(name: str, column: Column, batch: RecordBatch) -> FloatArray | None
         values = values * DEG_PER_RAD if name.startswith("delta_angle") else values
     else:
         return None
-    is_finite = np.isfinite(values)
-    return values if is_finite.all() else values[is_finite]
+    return values

@@ -65,6 +65,8 @@ class FieldCounts:
 
     def entry(self, clock: ClockModel) -> FieldEntry:
         """Return the form to keep."""
+        if not self.is_odd:
+            return FieldEntry(present=self.present)
         first_ns, ends = self.first_outside_ns, (self.low, self.high)
         low, high = (end if math.isfinite(end) else None for end in ends)
         time = None if first_ns is None else clock.text(first_ns)

@@ -8,7 +8,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, field, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 from groundstation.base.dataclasses import dataclass
@@ -128,7 +128,7 @@ class Thresholds:
     findings: FindingLimits
     ranges: Mapping[str, Mapping[str, Range]] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def sha256(self) -> str:
         """Digest of the values.
 

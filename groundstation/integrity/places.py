@@ -17,9 +17,9 @@ from groundstation.base.errors import GroundstationError
 from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
 from groundstation.integrity.counting import is_frozen
 from groundstation.integrity.ordering import joined_columns
-from groundstation.integrity.time_passes import lay, passes_over
+from groundstation.integrity.time_passes import MANY_LAID, lay, passes_over
 
-MEMORY_BYTES = 16 << 20  # when there are more, all go to a file
+MEMORY_BYTES = 64 << 20  # when there are more, all go to a file
 WINDOW_RECORDS = 500_000  # at least so many records of all topics are laid in order at a time
 
 
@@ -271,8 +271,8 @@ def _united(pieces: list[BatchPlaces]) -> tuple[Int64Array, Column]:
         seen, time = np.zeros(end - start, dtype=bool), np.zeros(end - start, dtype=np.int64)
         timed = seen if all(piece.time.present is None for piece in pieces) else seen.copy()
         for piece in reversed(pieces):
-            if timed is seen and passes_over(piece.index, piece.time.values):
-                lay(piece.index, piece.time.values, start, seen, time)
+            if piece.time.present is None and passes_over(piece.index, piece.time.values, least=MANY_LAID):
+                lay(piece.index, piece.time.values, start, seen, timed, time)
                 continue
             at = piece.index - start
             seen[at], time[at] = True, piece.time.values

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -137,7 +137,7 @@ def _longest_ns(period_ns: float, limits: GapLimits) -> float:
 
 def _is_sporadic(topic: str, rhythm: Rhythm, long_ns: float, limits: RhythmLimits) -> bool:
     """Tell whether a topic is written only when something happens."""
-    if any(fnmatchcase(topic, pattern) for pattern in limits.sporadic_topics):
+    if _is_among(topic, limits.sporadic_topics):
         return True
     if is_canonical(topic):
         return False
@@ -149,6 +149,11 @@ def _is_sporadic(topic: str, rhythm: Rhythm, long_ns: float, limits: RhythmLimit
         return True  # lists and definitions, written at one moment: the step in a burst is no period
     is_thin = rhythm.coverage < limits.burst_coverage
     return is_thin and gaps > 0 and (rhythm.ahead + 1) / (gaps + 1) < limits.burst_rows
+
+
+@lru_cache(maxsize=1_024)  # the flights of a folder have the same topics
+def _is_among(topic: str, patterns: tuple[str, ...]) -> bool:
+    return any(fnmatchcase(topic, pattern) for pattern in patterns)
 
 
 def _is_unexplained(rhythm: Rhythm, limits: RhythmLimits) -> bool:

@@ -1,7 +1,7 @@
 """One pass over a log: its header, clock model and ledger.
 
 Kept are places and times, 16 bytes a record, for each set of topics that are sampled together; when there are more than
-16 MiB of them, all go to a temporary file, 12 bytes a record; times of validity take 8 bytes more. Rates and gaps are
+64 MiB of them, all go to a temporary file, 12 bytes a record; times of validity take 8 bytes more. Rates and gaps are
 those of the times at which values were valid.
 """
 
@@ -100,7 +100,7 @@ def _order_of(places: Places, pieces: Sequence[PieceOnDisk], clock: ClockModel) 
         stray += int(np.isin(piece.index, clock.stray_index).sum()) if len(clock.stray_index) else 0
         at += kept.count
     lateness = 0
-    is_rising = clock.is_shift and not backward and all(kept.is_timed for kept in pieces)
+    is_rising = not backward and all(kept.is_timed and clock.is_shift(kept.first, kept.last) for kept in pieces)
     if not is_rising and (time_ns[1:] < time_ns[:-1]).any():
         lateness = int((np.maximum.accumulate(time_ns) - time_ns).max())
     if not (is_rising and valid_ns is time_ns) and (valid_ns[1:] < valid_ns[:-1]).any():

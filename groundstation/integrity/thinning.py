@@ -97,7 +97,8 @@ class Thinner:
     def measured(self, time: Int64Array) -> Measured:
         """Return the figures of many records that are all believed."""
         self._followed(time, np.zeros(1, dtype=np.int64), np.zeros(1, dtype=bool))
-        return Measured(*self._state[[EARLIEST, LATEST, LATENESS, LONGEST]].tolist(), self.period_ns)
+        earliest, latest, lateness, longest = self._state[[EARLIEST, LATEST, LATENESS, LONGEST]].tolist()
+        return Measured(earliest, latest, lateness, longest, self.period_ns)
 
     @property
     def period_ns(self) -> int:

@@ -12,6 +12,7 @@ from groundstation.base.compile import in_place
 from groundstation.base.records import Int64Array
 
 MANY = 16_384  # records from which a compiled pass pays
+MANY_LAID = 4_096  # of a piece among others
 MOST_SOURCES = 32  # told apart by a compiled pass
 TABLE_STEPS = 1 << 16  # steps of whole units that are counted in a table
 UNIT_NS = 1_000
@@ -21,9 +22,9 @@ MOST_BREAKS = 1_024  # between runs, that a compiled pass lists
 LATEST, EARLIEST, LATENESS, LONGEST, REST, STATE_SIZE = 0, 1, 2, 3, 4, 5
 
 
-def passes_over(*arrays: Any) -> bool:
-    """Tell whether a compiled pass takes arrays of one length: many records, without gaps."""
-    return len(arrays[0]) >= MANY and all(one.flags.c_contiguous for one in arrays)
+def passes_over(*arrays: Any, least: int | None = None) -> bool:
+    """Tell whether a compiled pass takes arrays of one length: many records, ``least`` or more, without gaps."""
+    return len(arrays[0]) >= (MANY if least is None else least) and all(one.flags.c_contiguous for one in arrays)
 
 
 @in_place
@@ -61,11 +62,11 @@ def count_back(time: Any, sources: Any, known: Any, last: Any, count: int) -> in
 
 
 @in_place
-def lay(index: Any, values: Any, start: int, seen: Any, time: Any) -> None:
-    """Lay the times of records at their places, counted from ``start``, and mark these as seen."""
+def lay(index: Any, values: Any, start: int, seen: Any, timed: Any, time: Any) -> None:
+    """Lay the times of records at their places, counted from ``start``; mark these as seen and timed."""
     for row in range(len(index)):
         at = index[row] - start
-        seen[at] = True
+        seen[at] = timed[at] = True
         time[at] = values[row]
 
 

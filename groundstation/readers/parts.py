@@ -101,15 +101,21 @@ def merged(topic: str, parts: Sequence[TopicPart]) -> RecordBatch:
     places_of = np.split(places, np.cumsum([len(part.index) for part in parts])[:-1])
     columns: dict[str, Column] = {}
     masks: dict[tuple[tuple[int, int], ...], BoolArray | None] = {}  # parts with the same masks share one
-    for name in dict.fromkeys(name for part in parts for name in part.columns):
-        known = {number: part.columns[name] for number, part in enumerate(parts) if name in part.columns}
-        pieces = [(places_of[number], column) for number, column in known.items()]
-        key = tuple((number, id(column.present)) for number, column in known.items())
+    several = {
+        name: [(number, part.columns[name]) for number, part in enumerate(parts) if name in part.columns]
+        for name in dict.fromkeys(name for part in parts for name in part.columns)
+    }
+    kinds = {name: np.result_type(*(one.values.dtype for _number, one in known)) for name, known in several.items()}
+    memory = iter(np.empty((sum(kind == np.float64 for kind in kinds.values()), len(index))))  # at once: larger pages
+    for name, known in several.items():
+        pieces = [(places_of[number], column) for number, column in known]
+        key = tuple((number, id(column.present)) for number, column in known)
         if key not in masks:
             masks[key] = _present(pieces, len(index))
-        columns[name] = Column(_values(pieces, len(index)), masks[key])
+        values = next(memory) if kinds[name] == np.float64 else np.empty(len(index), kinds[name])
+        columns[name] = Column(_laid(pieces, values), masks[key])
     times = list(zip(places_of, [part.time for part in parts], strict=True))
-    time = Column(_values(times, len(index)), _present(times, len(index)))
+    time = Column(_laid(times, np.empty(len(index), dtype=np.int64)), _present(times, len(index)))
     validity_ns = None
     if any(part.validity_ns is not None for part in parts):
         each = [part.time.values if part.validity_ns is None else part.validity_ns for part in parts]
@@ -126,11 +132,11 @@ def merged(topic: str, parts: Sequence[TopicPart]) -> RecordBatch:
     )
 
 
-def _values(pieces: Sequence[tuple[Int64Array, Column]], rows: int) -> NDArray[Any]:
-    """Return the values of several pieces at given places."""
-    kind = np.result_type(*(piece.values.dtype for _at, piece in pieces))
-    first = pieces[0][1].values[:1]  # a text that never changes is written as one run
-    values = np.full(rows, np.nan if kind.kind == "f" else first[0] if len(first) else 0, dtype=kind)
+def _laid(pieces: Sequence[tuple[Int64Array, Column]], values: NDArray[Any]) -> NDArray[Any]:
+    """Lay the values of several pieces at their places, a filler at all others."""
+    if sum(len(at) for at, _piece in pieces) < len(values):
+        first = pieces[0][1].values[:1]  # a text that never changes is written as one run
+        values[:] = np.nan if values.dtype.kind == "f" else first[0] if len(first) else 0
     for at, piece in pieces:
         values[at] = piece.values
     return values

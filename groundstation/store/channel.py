@@ -106,11 +106,11 @@ class ChannelWriter:
             rows = slice(pieces[0].start, pieces[-1].stop)
             buffer, starts = encode(self.id, self.count, time_ns[rows], publish_ns[rows], taken(slots, rows))
             self.count += len(starts)
-            ends = np.append(starts[1:], len(buffer))
             for piece in pieces:
                 self._close_at_boundary(int(time_ns[piece.start]))
-                of_piece = slice(piece.start - rows.start, piece.stop - rows.start)
-                self._append(time_ns[piece], starts[of_piece], buffer[starts[of_piece.start] : ends[of_piece.stop - 1]])
+                first, behind = piece.start - rows.start, piece.stop - rows.start
+                end = starts[behind] if behind < len(starts) else len(buffer)
+                self._append(time_ns[piece], starts[first:behind], buffer[starts[first] : end])
                 if self._bytes >= CHUNK_BYTES * 7 // 8:
                     self.flush()
 
@@ -256,4 +256,5 @@ def _together(pieces: Iterable[slice], most_rows: int) -> Iterator[list[slice]]:
 
 
 def _rows_before_boundary(time_ns: Int64Array, span_ns: int) -> int:
-    return int(np.searchsorted(time_ns, (int(time_ns[0]) // span_ns + 1) * span_ns))
+    boundary_ns = (int(time_ns[0]) // span_ns + 1) * span_ns
+    return len(time_ns) if time_ns[-1] < boundary_ns else int(time_ns.searchsorted(boundary_ns))

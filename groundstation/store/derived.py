@@ -160,13 +160,10 @@ class PoseWriter(DerivedWriter):
     def write(self, batch: RecordBatch) -> None:
         """Take in the first row with an attitude of each step in time."""
         attitude = [batch.columns.get(name) for name in ("roll_deg", "pitch_deg", "true_heading_deg")]
-        known = np.ones(len(batch), dtype=bool)
-        for column in attitude:
-            known &= False if column is None else column.mask & np.isfinite(column.values)
-        rows = np.flatnonzero(known)
+        rows = _known_rows(attitude, len(batch))
         if batch.time_ns is not None and len(rows):
             steps = batch.time_ns[rows] // POSE_STEP_NS
-            rows = rows[np.diff(steps, prepend=self._step) != 0]
+            rows = rows[np.flatnonzero(np.diff(steps, prepend=self._step))]
             self._step = int(steps[-1])
         place = self._places(batch, rows)  # called for no rows too, as it remembers the last one
         if batch.time_ns is None or not len(rows):
@@ -205,12 +202,26 @@ class PoseWriter(DerivedWriter):
         The value held may come from an earlier batch.
         """
         before, column = self._last.get(name, np.nan), batch.columns.get(name)
-        known = np.zeros(0, np.int64) if column is None else np.flatnonzero(column.mask & np.isfinite(column.values))
+        known = _known_rows([column], len(batch))
         if column is None or not len(known):
             return np.full(len(rows), before)
         self._last[name] = float(column.values[known[-1]])
+        if len(known) == len(batch):
+            return column.values[rows].astype(np.float64)
         at = np.searchsorted(known, rows, side="right") - 1
         return np.where(at >= 0, column.values[known[np.maximum(at, 0)]], before)
+
+
+def _known_rows(columns: Iterable[Column | None], count: int) -> Int64Array:
+    """Return the rows in which every column has a finite value."""
+    known = np.ones(count, dtype=bool)
+    for column in columns:
+        if column is None:
+            return np.empty(0, np.int64)
+        np.logical_and(known, np.isfinite(column.values), out=known)
+        if column.present is not None:
+            np.logical_and(known, column.present, out=known)
+    return np.arange(count) if known.all() else np.flatnonzero(known)
 
 
 class LogWriter(DerivedWriter):

@@ -43,6 +43,8 @@ _DATA_END = _PREFIX.pack(Opcode.DATA_END, 4)
 _CHUNK_HEAD = struct.Struct("<BQQQQII")  # opcode, length, start, end, uncompressed size, crc, length of compression
 _INDEX_HEAD = struct.Struct("<BQHI")  # opcode, length, channel, bytes of entries
 INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
+assert HEAD.fields is not None
+_SEQUENCE_AT = HEAD.fields["sequence"][1]
 
 _READABLE: Mapping[int, Any] = {
     Opcode.HEADER: Header,
@@ -151,7 +153,7 @@ def chunk_head(start_time: int, end_time: int, uncompressed_size: int, crc: int,
     return _CHUNK_HEAD.pack(Opcode.CHUNK, length, start_time, end_time, uncompressed_size, crc, 4) + tail
 
 
-def read_chunk_head(data: bytes, *, need_lengths: bool = True) -> ChunkHead | None:
+def read_chunk_head(data: bytes | memoryview, *, need_lengths: bool = True) -> ChunkHead | None:
     """Read the head of the chunk at the start of ``data``; None when it is inconsistent.
 
     Without ``need_lengths`` only the places are used: for a chunk whose extent an index tells.
@@ -164,7 +166,7 @@ def read_chunk_head(data: bytes, *, need_lengths: bool = True) -> ChunkHead | No
     data_at = _CHUNK_HEAD.size + text_length + 8
     if opcode != Opcode.CHUNK or text_length > 4 or length + RECORD_PREFIX < data_at:
         return None
-    compression = data[_CHUNK_HEAD.size : data_at - 8]
+    compression = bytes(data[_CHUNK_HEAD.size : data_at - 8])
     (data_length,) = struct.unpack_from("<Q", data, data_at - 8)
     if data_length != length + RECORD_PREFIX - data_at or compression not in (b"zstd", b"lz4", b""):
         return None
@@ -206,7 +208,7 @@ def _evenly_spaced(buffer: ByteArray) -> ChunkMessages | None:
         np.broadcast_to(np.int64(stride), count),
         stride,
     )
-    return messages if messages.is_alike(0, HEAD.fields["sequence"][1]) else None
+    return messages if messages.is_alike(0, _SEQUENCE_AT) else None
 
 
 @dataclass

@@ -50,7 +50,7 @@ from groundstation.store.marks import MAGIC, METADATA_NAME, PACKAGE
 LIBRARY, MCAP_VERSION = f"groundstation {__version__}", mcap.__version__
 # Higher levels save 4 to 7 % of recorded flights and read random mantissas a quarter slower: docs/decisions/007.
 ZSTD_LEVEL = -1
-MEMORY_BYTES = 32 << 20  # finished chunks kept in memory; when there are more, all go to the spool
+MEMORY_BYTES = 32 << 20  # finished chunks kept in memory; when there are more, the oldest go to the spool
 COMPRESSING = min(2, os.cpu_count() or 1)  # threads that compress; the one that encodes waits for them when it is ahead
 MOST_ON_THEIR_WAY = 4  # chunks that wait for those threads
 PART = ".part"  # end of the name of a file that is being written
@@ -110,7 +110,7 @@ class StoreWriter:
         self._names: set[str] = set()
         self._compressors = local()  # one for each thread
         self._chunks: list[_Finished] = []
-        self._bytes = self._spooled = 0  # bytes of all of them; how many are in the spool
+        self._bytes = self._spooled = 0  # bytes of those in memory; how many are in the spool
         self._spool: BinaryIO | None = None
         self._threads = ThreadPoolExecutor(COMPRESSING, "store")
         self._on_their_way: deque[Future[_Finished]] = deque()
@@ -249,16 +249,17 @@ class StoreWriter:
         return _Finished((head, data, messages), 0, length + len(messages), chunk.topic, index)
 
     def _keep(self, chunk: _Finished) -> None:
-        """Keep a compressed chunk in memory; all go to the spool when they are many."""
+        """Keep a compressed chunk in memory; the oldest go to the spool when there are more bytes than memory for."""
         assert self._spool is not None
         self._chunks.append(chunk)
         self._bytes += chunk.nbytes
-        if self._bytes > MEMORY_BYTES:
-            for one in self._chunks[self._spooled :]:
-                one.place = self._spool.tell()
-                self._spool.writelines(one.parts)
-                one.parts = ()
-            self._spooled = len(self._chunks)
+        while self._bytes > MEMORY_BYTES:
+            oldest = self._chunks[self._spooled]
+            oldest.place = self._spool.tell()
+            self._spool.writelines(oldest.parts)
+            oldest.parts = ()
+            self._bytes -= oldest.nbytes
+            self._spooled += 1
 
     def _finish(self, file: DigestedFile) -> None:
         """Write the whole file: definitions, chunks, facts again, summary."""
@@ -298,6 +299,7 @@ class StoreWriter:
         start = file.tell()
         if chunk.parts:
             file.writelines(chunk.parts)
+            chunk.parts = ()
         else:
             self._spool.seek(chunk.place)
             file.write(self._spool.read(chunk.nbytes))

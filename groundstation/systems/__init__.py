@@ -38,7 +38,10 @@ def systems() -> "Systems":
 
 @cache
 def systems_for(name: str) -> "Systems":
-    """Return our system of that name alone, all systems where none of ours has it: what one serves loads no other."""
+    """Return our system of that name alone, all systems where none of ours has it.
+
+    What one system serves loads no other.
+    """
     path = f"{__name__}.{name}.system"
     if path not in OURS:
         return systems()

@@ -284,7 +284,7 @@ class Known:
 
     @property
     def runways_problem(self) -> str:
-        """Why the user's own table of runways is not used; empty where it is, or there is none."""
+        """Reason why the user's own table of runways is not used, else empty."""
         return self.find_runways()[1]
 
     @property

@@ -41,9 +41,10 @@ class GrowingTable:
         """Take the rows of a batch; it has ``time_ns``."""
         start, end = self._rows, self._rows + len(batch)
         room = max(min(self._expected, MOST_AHEAD * end), end)
-        for name in batch.columns:
-            if name not in self._columns:
-                self._columns[name] = _Growing()
+        new = {name: one.values.dtype for name, one in batch.columns.items() if name not in self._columns}
+        memory = iter(np.empty((sum(kind == np.float64 for kind in new.values()), room)))  # at once: larger pages
+        for name, kind in new.items():
+            self._columns[name] = _Growing(next(memory) if kind == np.float64 else None)
         self._time_ns.put(Column(time_of_validity_ns(batch)), start, end, room)
         self._index.put(Column(batch.record_index), start, end, room)
         self._device.put(batch.device_time_ns, start, end, room)
@@ -76,8 +77,8 @@ def unless_all(present: BoolArray | None) -> BoolArray | None:
 class _Growing:
     """Column that grows: its values, and its mask from the first absent value on."""
 
-    def __init__(self) -> None:
-        self._values: NDArray[Any] = np.empty(0)
+    def __init__(self, memory: NDArray[Any] | None = None) -> None:
+        self._values: NDArray[Any] = np.empty(0) if memory is None else memory
         self._present: BoolArray | None = None
         self._types: list[np.dtype[Any]] = []  # that came, in their order
 
@@ -110,7 +111,8 @@ class _Growing:
         self._types.append(dtype)
         common = np.result_type(*self._types) if len(self._types) > 1 else dtype
         if is_first:
-            self._values = np.empty(room, dtype=common)
+            if len(self._values) != room or self._values.dtype != common:
+                self._values = np.empty(room, dtype=common)
             if start:
                 self._values[:start] = self._filler
                 self._present = np.ones(room, dtype=bool)

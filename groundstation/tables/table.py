@@ -135,7 +135,9 @@ class Table:
         return texts if column.mask.all() else np.where(column.mask, texts, "")
 
     def take(self, index: Any) -> Self:
-        """The rows that ``index`` (slice, mask or positions) selects."""
+        """The rows that ``index`` (slice, mask or positions) selects; the table itself where a mask selects all."""
+        if isinstance(index, np.ndarray) and index.dtype == bool and len(index) == len(self) and index.all():
+            return self
         return replace(
             self,
             time_ns=self.time_ns[index],

@@ -289,11 +289,12 @@ class Chart:
         """
         time_s = np.linspace(self.x.low, self.x.high, CURSOR_STEPS)
         x = np.linspace(0.0, WIDTH, CURSOR_STEPS)
-        strips = [np.array([[place, 0.0], [place, self.height]]) for place in x.tolist()]
+        strips = np.zeros((CURSOR_STEPS, 2, 2))
+        strips[:, :, 0], strips[:, 1, 1] = x[:, None], self.height
         style = rr.LineStrips2D.from_fields(colors=[colours.LIGHT], radii=screen_radius(CURSOR), draw_order=NOW)
         self.recorder.static(f"{self.path}/cursor", style)
         after = np.append(time_s, self.x.high + (time_s[1] - time_s[0]))
-        columns = rr.LineStrips2D.columns(strips=strips).partition([*[1] * len(strips), 0])
+        columns = rr.LineStrips2D.columns(strips=strips).partition([*[1] * len(strips), 0])  # type: ignore[arg-type]
         indexes = self.recorder.indexes(self.recorder.time_ns(after))
         self.recorder.stream.send_columns(f"{self.path}/cursor", indexes, columns)
 

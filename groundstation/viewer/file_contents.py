@@ -4,7 +4,6 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC as UTC_ZONE
 from datetime import datetime
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 from uuid import UUID
@@ -14,6 +13,7 @@ import pyarrow as pa
 from rerun.chunk import Chunk, RrdReader
 
 from groundstation.base.dataclasses import dataclass
+from groundstation.base.installed import installed_version
 from groundstation.viewer.recorder import UTC
 
 MAGIC = b"RRF2"  # the file's first bytes; behind them a byte each of major, minor and patch version
@@ -23,7 +23,7 @@ NS_PER_S = 1e9
 
 def rerun_version() -> str:
     """Return the version of the Rerun that is installed here."""
-    return metadata.version("rerun-sdk")
+    return installed_version("rerun-sdk")
 
 
 def version_in(head: bytes) -> str:

@@ -156,7 +156,7 @@ class Recorder:
         for part in self._parts(time_ns):
             scalars = rr.Scalars.columns(scalars=np.ascontiguousarray(values[part]).ravel())
             rows = len(time_ns[part])
-            self.stream.send_columns(path, self.indexes(time_ns[part]), scalars.partition([width] * rows))
+            self.stream.send_columns(path, self.indexes(time_ns[part]), scalars.partition(np.full(rows, width)))
 
     def _parts(self, time_ns: Int64Array) -> Iterable[slice | Int64Array]:
         """Return rows in parts that one call sends."""

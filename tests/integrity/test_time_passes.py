@@ -53,6 +53,7 @@ def test_a_clock_of_many_records_is_that_of_few(
     items: list[Item] = log_of(seed, is_counting=True)
     few = survey(items)
     monkeypatch.setattr(time_passes, "MANY", 1)
+    monkeypatch.setattr(places, "MANY_LAID", 1)
     many = survey(items)
     for entry in fields(few.clock):
         one, other = getattr(few.clock, entry.name), getattr(many.clock, entry.name)

@@ -140,6 +140,13 @@ def test_frame_types_depend_on_the_field_alone() -> None:
         assert frame.isna().sum().tolist() == [missing] * 5
 
 
+def test_a_mask_that_selects_all_rows_copies_none() -> None:
+    table = gather(batch("ins", [0, 1, 2], roll_deg=[1.0, 2.0, 3.0]))["ins"]
+    assert table.take(np.ones(3, dtype=bool)) is table
+    assert table.take(np.array([True, False, True])).values("roll_deg").tolist() == [1.0, 3.0]
+    assert table.take(np.array([0, 1, 2])).values("roll_deg").tolist() == [1.0, 2.0, 3.0]
+
+
 def test_an_empty_table_answers_everything() -> None:
     empty = Table.empty("ins")
     assert (len(empty), empty.values("roll_deg").shape, empty.valid("roll_deg").shape) == (0, (0,), (0,))

@@ -302,8 +302,13 @@ def test_bars_stand_where_their_bins_are(contents: Contents, flight: Flight) -> 
     assert whole == pytest.approx(np.stack([bins["bin_low_deg"], bins["bin_high_deg"]]), abs=1e-5)
     fitted = spans(contents.fixed["/distribution/fitted_normal"][0])
     assert fitted.mean(axis=0) == pytest.approx(normal["difference_deg"], abs=1e-5)
-    grown = spans(contents.batches["/distribution/samples_so_far"][0])
+    charts = contents.batches["/distribution/samples_so_far"]
+    told = [batch for batch in charts if "BarChart:abscissa" in batch.schema.names]
+    grown = spans(told[0])
     assert grown.mean(axis=0) == pytest.approx(growth["bin_center_deg"][: grown.shape[1]], abs=1e-5)
+    assert [batch.num_rows for batch in told] == [1] < [len(charts)]  # from the first chart on the places hold
+    first_ns, times_ns = np.asarray(told[0].column("flight_time").cast(pa.int64())), contents.times
+    assert first_ns[0] == times_ns("/distribution/samples_so_far").min()
 
 
 def test_findings_and_events_stand_in_the_log_with_severity_and_time(contents: Contents) -> None:

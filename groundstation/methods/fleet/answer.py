@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.quantiles import normal_below
 from groundstation.methods.fleet.aircraft import mean_over_flights
 from groundstation.methods.fleet.changes import ChangeSettings
 from groundstation.methods.fleet.moments import Moments, merged, moments_of
@@ -162,12 +163,10 @@ def calibrate(quantity: str, title: str, z: FloatArray, is_inside: NDArray[np.bo
     FleetCalibration or None
         None without checks.
     """
-    from scipy.special import ndtr
-
     if not len(z):
         return None
     found = moments_of(z)
-    place = np.minimum((ndtr(z) * PIT_BINS).astype(np.int64), PIT_BINS - 1)
+    place = np.minimum((normal_below(z) * PIT_BINS).astype(np.int64), PIT_BINS - 1)
     inside = int(np.sum(is_inside))
     return FleetCalibration(
         quantity,

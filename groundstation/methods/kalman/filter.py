@@ -351,24 +351,22 @@ def _room(n: int, m: int, size: int, channels: int, kept: KeptArrays) -> FilterR
     )
 
 
-def forecast(
-    transition: Transition, step: Int64Array, start: FloatArray, known: FloatArray, every: int, drive: Drive
+def forecast_driven(
+    growth: FloatArray, mix: FloatArray, known: FloatArray, every: int, start: FloatArray
 ) -> FloatArray:
-    """Carry many starts forward together, and return what one state of each builds up.
+    """Carry one state of many starts forward that acts on no other one but drags itself.
 
     Parameters
     ----------
-    transition : Transition
-        Sparse.
-    step : ndarray of int, shape (k,)
-        Numbers of the transition's steps in order.
-    start : ndarray, shape (states, c, s)
+    growth : ndarray, shape (k, c, s)
+        Growth of the state over each step by the other ones.
+    mix : ndarray, shape (k, c, c, s)
+        Share of the state, and of what it had built up before, that moves it in each right-hand side.
     known : ndarray, shape (c, s)
-        Error that the driven state had built up before the start: it is dragged as well.
+        Error that the state had built up before the start.
     every : int
         Steps between two leads.
-    drive : Drive
-        ``mix`` of shape (k, c, c, s) or without length; ``push`` is not used.
+    start : ndarray, shape (c, s)
 
     Returns
     -------
@@ -376,36 +374,7 @@ def forecast(
     """
     from groundstation.methods.kalman import runs
 
-    x = np.array(start, order="C")
-    built_up = np.zeros((len(step) // every, *x.shape[1:]))
-    moved = Drive(drive.state, frozen(drive.mix), frozen(drive.push))
-    steps, before = frozen(np.ascontiguousarray(step, dtype=np.int64)), frozen(np.ascontiguousarray(known))
-    runs.run_forecast(
-        transition.dynamics, steps, moved, before, every, x, np.empty_like(x), np.empty(x.shape[1:]), built_up
-    )
+    built_up = np.zeros((len(growth) // every, *start.shape))
+    growth, mix, known = (frozen(np.ascontiguousarray(part)) for part in (growth, mix, known))
+    runs.run_driven(growth, mix, known, every, np.stack([start, start]), built_up)
     return built_up
-
-
-def forecast_variances(transition: Transition, step: Int64Array, starts: FloatArray, every: int) -> FloatArray:
-    """Carry the covariances of many starts forward without measurements, and return their variances.
-
-    Parameters
-    ----------
-    transition : Transition
-    step : ndarray of int, shape (s, k)
-        Which of the transition's steps each step of a start is.
-    starts : ndarray, shape (s, n, n)
-    every : int
-        Steps between two leads.
-
-    Returns
-    -------
-    ndarray, shape (s, k // every, n)
-    """
-    from groundstation.methods.kalman import runs
-
-    size, leads = transition.size, step.shape[1] // every
-    out, p = np.empty((len(step), leads, size)), np.array(starts, dtype=np.float64, order="C")
-    steps = frozen(np.ascontiguousarray(step, dtype=np.int64))
-    runs.run_variances(transition.states, transition.dynamics, steps, every, p, np.empty((size, size)), out)
-    return out

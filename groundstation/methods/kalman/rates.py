@@ -109,3 +109,31 @@ class Rates:
         scratch = np.empty((2, self.size))
         series.carry_by_rates(self.rows, self.columns, entries, which, float(step_s), every, x, scratch, out)
         return out
+
+    def variances(
+        self,
+        values: FloatArray,
+        step: Int64Array,
+        step_s: float,
+        every: int,
+        starts: FloatArray,
+        density: FloatArray,
+    ) -> FloatArray:
+        """Carry the covariances of many starts forward as :meth:`carried` does the states.
+
+        The result is the variance of each state, shape (s, k // every, n).
+
+        Parameters
+        ----------
+        starts : ndarray, shape (s, n, n)
+        density : ndarray, shape (n,)
+            Power spectral densities of the white noises.
+        """
+        F, half = self.matrices(values, np.full(len(values), step_s)), 0.5 * step_s * np.diag(density)
+        P, out = starts, np.empty((len(step), step.shape[1] // every, self.size))
+        for k in range(out.shape[1] * every):
+            over = F[step[:, k]]
+            P = over @ (P + half) @ over.transpose(0, 2, 1) + half
+            if (k + 1) % every == 0:
+                out[:, k // every] = np.einsum("sii->si", P)
+        return out

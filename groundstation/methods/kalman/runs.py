@@ -209,92 +209,36 @@ def run_filter(
 
 
 @in_place
-def run_forecast(
-    dynamics: Dynamics,
-    step: Int64Array,
-    drive: Drive,
-    known: FloatArray,
-    every: int,
-    x: FloatArray,
-    w: FloatArray,
-    dragged: FloatArray,
-    built_up: FloatArray,
+def run_driven(
+    growth: FloatArray, mix: FloatArray, known: FloatArray, every: int, x: FloatArray, built_up: FloatArray
 ) -> None:
-    """Carry the states of many starts forward together, and record what one of them builds up.
+    """Add up what one state of many starts grows by, and by what it is dragged by itself.
 
     Parameters
     ----------
-    dynamics : Dynamics
-        Sparse.
-    step : ndarray of int, shape (k,)
-        Number of the distinct step that each is; k = ``every`` times the leads.
-    drive : Drive
-        ``mix`` of shape (k, c, c, s), or of no length; it drags what stands in the state and ``known`` together.
+    growth : ndarray, shape (k, c, s)
+        Growth over each step by the other states; k = ``every`` times the leads.
+    mix : ndarray, shape (k, c, c, s)
+        It drags what stands in the state and ``known`` together.
     known : ndarray, shape (c, s)
         Error that the state had built up before the start.
-    x : ndarray, shape (n, c, s)
-        States of s starts, changed in place.
-    w, dragged : ndarrays, shapes (n, c, s), (c, s)
-        Room.
+    x : ndarray, shape (2, c, s)
+        The state, changed in place, and room.
     built_up : ndarray, shape (leads, c, s)
-        Filled: the driven state after every ``every`` steps.
+        Filled: the state after every ``every`` steps.
     """
-    rows, starts, columns = dynamics.pattern
-    F, driven, mix = dynamics.F, drive.state, drive.mix
-    channels, count = x.shape[1], x.shape[2]
-    for k in range(len(step)):
-        for c in range(channels if len(mix) > 0 else 0):
-            for s in range(count):
-                dragged[c, s] = 0.0
-            for j in range(channels):
-                for s in range(count):
-                    dragged[c, s] += mix[k, c, j, s] * (known[j, s] + x[driven, j, s])
-        for t in range(len(rows)):
-            for c in range(channels):
-                for s in range(count):
-                    w[t, c, s] = 0.0
-                for e in range(starts[t], starts[t + 1]):
-                    a, r = F[step[k], e], columns[e]
-                    for s in range(count):
-                        w[t, c, s] += a * x[r, c, s]
-        for t in range(len(rows)):
-            for c in range(channels):
-                for s in range(count):
-                    x[rows[t], c, s] = w[t, c, s]
+    channels, count = known.shape
+    for k in range(len(growth)):
         for c in range(channels):
             for s in range(count):
-                x[driven, c, s] += dragged[c, s]
+                x[1, c, s] = x[0, c, s] + growth[k, c, s]
+            for j in range(channels):
+                for s in range(count):
+                    x[1, c, s] += mix[k, c, j, s] * (known[j, s] + x[0, j, s])
+        for c in range(channels):
+            for s in range(count):
+                x[0, c, s] = x[1, c, s]
         if (k + 1) % every == 0:
             for c in range(channels):
                 for s in range(count):
-                    built_up[(k + 1) // every - 1, c, s] = x[driven, c, s]
-
-
-@in_place
-def run_variances(
-    states: States, dynamics: Dynamics, step: Int64Array, every: int, p: FloatArray, w: FloatArray, out: FloatArray
-) -> None:
-    """Carry the covariances of many starts forward, and record their variances.
-
-    Parameters
-    ----------
-    step : ndarray of int, shape (s, k)
-        Number of the distinct step that each step of a start is; k = ``every`` times the leads.
-    p : ndarray, shape (s, n, n)
-        Covariance at each start, changed in place.
-    w : ndarray, shape (n, n)
-        Room.
-    out : ndarray, shape (s, leads, n)
-        Filled: variances after every ``every`` steps.
-    """
-    pattern, F, noise_rows, noise_columns, before, after = dynamics
-    for s in range(len(p)):
-        for k in range(step.shape[1]):
-            if len(before) > 0:
-                add_noise(states, noise_rows, noise_columns, before, step[s, k], p[s])
-            predict_covariance(states, pattern, F, step[s, k], p[s], w)
-            if len(after) > 0:
-                add_noise(states, noise_rows, noise_columns, after, step[s, k], p[s])
-            if (k + 1) % every == 0:
-                for i in range(len(states)):
-                    out[s, (k + 1) // every - 1, i] = p[s, i, i]
+                    built_up[(k + 1) // every - 1, c, s] = x[0, c, s]

@@ -184,7 +184,7 @@ def _search(
     variance = spread_of(plain.rows(windows.values[..., None])) ** 2
     left = []
     for delay in search_s:
-        value, _rate = reference.at(windows.time_s - delay)
+        value = reference.signal_at(windows.time_s - delay)
         parts = np.concatenate([value[..., 1:], (windows.values - value[..., 0])[..., None]], axis=-1)
         rows = plain.rows(parts).reshape(-1, parts.shape[-1])
         rows, target = rows[:, :-1], rows[:, -1]

@@ -5,6 +5,8 @@ A noise model whitens them.
 
 from collections.abc import Callable
 from dataclasses import field, replace
+from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,14 +70,41 @@ class ReferenceSignals:
 
         They are cubic between samples (Catmull-Rom).
         """
+        between = self._between(time_s)
+        return self.build(between.value), self.build(between.rate)
+
+    def signal_at(self, time_s: FloatArray) -> FloatArray:
+        """Return the built signals of :meth:`at` alone."""
+        return self.build(self._between(time_s).value)
+
+    def _between(self, time_s: FloatArray) -> "_Cubic":
         after = np.clip(np.searchsorted(self.time_s, time_s), 1, len(self.time_s) - 1)
         step = (self.time_s[after] - self.time_s[after - 1])[..., None]
         u = (time_s - self.time_s[after - 1])[..., None] / step
         left, right = self.values[after - 1], self.values[after]
         rise, fall = self.slopes[after - 1] * step, self.slopes[after] * step
-        bent, over = rise + fall - 2.0 * (right - left), 3.0 * (right - left) - 2.0 * rise - fall
-        value = left + u * (rise + u * (over + u * bent))
-        return self.build(value), self.build((rise + u * (2.0 * over + u * (3.0 * bent))) / step)
+        return _Cubic(u, step, left, rise, 3.0 * (right - left) - 2.0 * rise - fall, rise + fall - 2.0 * (right - left))
+
+
+class _Cubic(NamedTuple):
+    """Cubics by share ``u`` of the ``step`` that a time lies in, and their values and slopes over a step."""
+
+    u: FloatArray
+    step: FloatArray
+    left: FloatArray
+    rise: FloatArray
+    over: FloatArray
+    bent: FloatArray
+
+    @property
+    def value(self) -> FloatArray:
+        """Values at the times."""
+        return self.left + self.u * (self.rise + self.u * (self.over + self.u * self.bent))
+
+    @property
+    def rate(self) -> FloatArray:
+        """Rates at the times, per second."""
+        return (self.rise + self.u * (2.0 * self.over + self.u * (3.0 * self.bent))) / self.step
 
 
 @dataclass(frozen=True)
@@ -235,6 +264,7 @@ def noise_of(windows: Windows, left: FloatArray, degree: int) -> Noise:
     powers = windows.polynomials(degree)
     count = (int(np.sum(windows.known)) - len(windows) * (degree + 1)) * left.shape[2]
 
+    @cache  # the best so far is met again in each of the three searches
     def tried(share: float, time_s: float) -> tuple[float, Noise]:
         factor = windows.whitener(Noise(1.0, share, time_s))
         basis, triangle = np.linalg.qr(factor @ powers)

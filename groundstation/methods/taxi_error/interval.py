@@ -9,6 +9,7 @@ The sampling itself is in ``sampling.py``.
 """
 
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_360
 from groundstation.base.dataclasses import dataclass
+from groundstation.base.halves import both, has_two_cores
 from groundstation.base.units import ARCMIN_PER_DEG, DEG_PER_RAD
 from groundstation.methods.taxi_error import noise
 from groundstation.methods.taxi_error.posterior import ErrorPosterior, even_draws
@@ -161,13 +163,23 @@ class _Target:
     def likelihood(self, thetas: FloatArray, checkpoints: NDArray[np.int64], room: noise.NoiseWorkspace) -> _Found:
         """Return the same with the log likelihood alone as density.
 
-        ``room`` then holds the results of the loops.
+        ``room`` then holds the results of the loops: of few draws, which no second core shares.
         """
         count, rest = len(thetas), self.width - 1
         log_likelihood, estimate = np.empty(count), np.empty((count, rest))
         variance, alone = np.empty((count, len(checkpoints), rest)), np.empty((count, 2))
-        out = (log_likelihood, estimate, variance, self.prior_of_alone, alone)
-        noise.evaluate(thetas, self.still, self.taxi, self.prior, checkpoints, *out, room)
+
+        def fill(part: slice, room: noise.NoiseWorkspace) -> None:
+            out = log_likelihood[part], estimate[part], variance[part], self.prior_of_alone, alone[part]
+            noise.evaluate(thetas[part], self.still, self.taxi, self.prior, checkpoints, *out, room)
+
+        rounds = -(-count // noise.LANES)
+        if rounds > 1 and has_two_cores():
+            half = -(-rounds // 2) * noise.LANES
+            other = noise.room_for(self.width, len(checkpoints))
+            both(partial(fill, slice(half), room), partial(fill, slice(half, count), other))
+        else:
+            fill(slice(count), room)
         return _Found(log_likelihood, estimate, variance, alone)
 
     def whole(self, thetas: FloatArray) -> FloatArray:

@@ -13,7 +13,6 @@ import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, field
 from functools import cache
-from importlib import metadata as installed
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
@@ -22,6 +21,7 @@ from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.failures import is_incomplete
 from groundstation.base.findings import Finding
+from groundstation.base.installed import installed_version
 from groundstation.base.runways.kept import usable_runways
 from groundstation.base.version import __version__
 from groundstation.pipeline.one_flight.apply import corrected_name
@@ -160,8 +160,8 @@ def versions() -> Mapping[str, str]:
 
 def _version(package: str) -> str:
     try:
-        return installed.version(package)
-    except installed.PackageNotFoundError:
+        return installed_version(package)
+    except ModuleNotFoundError:
         return ""
 
 

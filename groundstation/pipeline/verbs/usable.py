@@ -31,7 +31,7 @@ def flight_purposes(among: "Systems | None" = None) -> Mapping[str, Analysis]:
 
 
 def session_purposes(among: "Systems | None" = None) -> Mapping[str, Analysis]:
-    """Return the analyses of a session that can be asked for, by name, as :func:`flight_purposes`."""
+    """Return the analyses of a session that can be asked for, by name."""
     return {one.name: one for one in (among or systems()).session_analyses if one.examine}
 
 

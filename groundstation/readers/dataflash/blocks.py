@@ -244,7 +244,7 @@ class Scanner:
         count = int(self._state[scan.COUNT])
         if count:
             block = RecordBlock(data, offsets[:count].copy(), types[:count].copy(), self._count, dict(self.definitions))
-            self._seen[block.types] = True
+            self._seen |= np.bincount(block.types, minlength=len(self._seen)) > 0
             self._count += count
             self._state[scan.COUNT] = 0
             yield block

@@ -21,7 +21,7 @@ from groundstation.readers.dataflash import rules
 from groundstation.readers.dataflash.choices import Choices
 from groundstation.readers.dataflash.overview import DataflashOverview, Unit
 from groundstation.readers.dataflash.rules import FIX_2D, FIX_3D, FieldRule, UnknownUnits
-from groundstation.readers.dataflash.values import RecordRows, as_double
+from groundstation.readers.dataflash.values import RecordRows
 from groundstation.readers.layout import velocity_from_track
 from groundstation.readers.mapping import named
 from groundstation.readers.parts import TopicPart, bounded, merged, occupied, sampled_ns
@@ -146,8 +146,10 @@ class Mapper:
             passed_over = rule.passed_over(definition, units)
             if passed_over is not None:
                 self._passed_over[topic, rule.field] = (passed_over, f"{definition.name}.{rule.source}")
-            values = as_double(rows.values(rule.source))
-            found[rule.field] = values if factor == 1.0 else values * factor
+            values = rows.doubles(rule.source)
+            if factor != 1.0:
+                values *= factor
+            found[rule.field] = values
         return found
 
     def _placed(self, topic: str, values: Mapping[str, FloatArray], claimed: BoolArray | bool = True) -> BoolArray:
@@ -249,7 +251,7 @@ class Mapper:
         }
         columns |= self._plain(rules.SATELLITES)(topic, rows)
         if has_status:
-            columns["fix"] = named(as_double(rows.values("Status")), rules.FIXES)
+            columns["fix"] = named(rows.doubles("Status"), rules.FIXES)
         return columns | self._sigmas(rows, has_3d)
 
     def _sigmas(self, rows: RecordRows, has_fix: BoolArray) -> dict[str, Column]:
@@ -272,9 +274,9 @@ class Mapper:
         definition = rows.definition
         if not definition.has_numbers(*rules.INCREMENTS) or not definition.has_numbers(rules.INTERVAL):
             return {}
-        values = [as_double(rows.values(name)) for name in rules.INCREMENTS]
+        values = [rows.doubles(name) for name in rules.INCREMENTS]
         angle_s, velocity_s = (
-            as_double(rows.values(name if definition.has_numbers(name) else rules.INTERVAL))
+            rows.doubles(name if definition.has_numbers(name) else rules.INTERVAL)
             for name in (rules.ANGLE_INTERVAL, rules.VELOCITY_INTERVAL)
         )
         return imu.increments(values[:3], values[3:], angle_s, velocity_s)
@@ -284,7 +286,7 @@ class Mapper:
         columns = {name: Column(column) for name, column in values.items()}
         named = next((name for name in rules.TEMPERATURE if rows.definition.has_numbers(name)), None)
         if named and columns:
-            temperature = as_double(rows.values(named))
+            temperature = rows.doubles(named)
             columns["temperature_c"] = Column(temperature, temperature != 0.0)  # of a sensor without one
         return imu.samples(columns)
 

@@ -16,7 +16,7 @@ from groundstation.base.records import BoolArray, Damage, Int64Array
 from groundstation.readers.dataflash.blocks import RecordBlock, Scanner
 from groundstation.readers.dataflash.definitions import RecordDefinition, Units
 from groundstation.readers.dataflash.rules import FIX_3D, SIGMAS, FieldRule, UnknownUnits
-from groundstation.readers.dataflash.values import RecordRows, as_double, by_instance, rows_of
+from groundstation.readers.dataflash.values import RecordRows, by_instance, rows_of
 
 MESSAGES_KEPT = 100
 MOST_INSTANCES = 32  # more values than that tell no sensors apart
@@ -287,11 +287,11 @@ class _Survey:
         for part in by_instance(rows, instance_field) if instance_field else (rows,):
             receiver = (_ACCURACY_TYPES[rows.definition.name], part.instance)
             if has_arrivals:
-                arrived_ns = as_double(part.values(_ARRIVAL)) * NS_PER_MS
+                arrived_ns = part.doubles(_ARRIVAL) * NS_PER_MS
                 self._arrivals.setdefault(receiver, []).append((part.time_ns.values, arrived_ns))
             if not factors:
                 continue
-            sigmas = {rule.field: as_double(part.values(rule.source)) * factor for rule, factor in factors.items()}
+            sigmas = {rule.field: part.doubles(rule.source) * factor for rule, factor in factors.items()}
             self._sigma.setdefault(receiver, []).append((part.time_ns.values, sigmas))
 
     def _status(self, rows: RecordRows) -> None:

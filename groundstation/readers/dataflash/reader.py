@@ -4,6 +4,8 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 
+import numpy as np
+
 from groundstation.base.records import MAX_BATCH_ROWS, Damage, Item, LogHeader, NewLog, RecordBatch
 from groundstation.readers.dataflash.blocks import RecordBlock, Scanner
 from groundstation.readers.dataflash.canonical import Mapper
@@ -38,7 +40,8 @@ def items(source: Source) -> Iterator[Item]:
             by_type[rows.definition.type_id] += len(rows)
             by_topic[topic] += len(rows)
             if rows.definition.time_field is not None:
-                unreadable[topic] = unreadable.get(topic, 0) + int((~rows.time_ns.mask).sum())
+                absent = 0 if rows.time_ns.present is None else int(np.count_nonzero(~rows.time_ns.present))
+                unreadable[topic] = unreadable.get(topic, 0) + absent
             yield from _batches(topic, rows)
             mapper.take(rows)
         yield from mapper.batches()

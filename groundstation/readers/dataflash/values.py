@@ -47,6 +47,16 @@ class RecordRows:
         assert spec is not None, f"{self.definition.name} has no {name}"
         return column(self.records, spec)
 
+    def doubles(self, name: str) -> FloatArray:
+        """Column of one field of numbers in double precision, a signalling NaN made a quiet one."""
+        spec = self.definition.find(name)
+        assert spec is not None, f"{self.definition.name} has no {name}"
+        values = self.records[name]
+        if spec.divisor:
+            return np.asarray(values / spec.divisor)
+        with np.errstate(invalid="ignore"):
+            return values.astype(np.float64, order="C")
+
     def columns(self) -> dict[str, Column]:
         """All columns; a field of 32 numbers becomes 32 columns."""
         found: dict[str, Column] = {}
@@ -85,6 +95,10 @@ def device_time(definition: RecordDefinition, records: NDArray[Any]) -> Column:
         return Column(np.zeros(len(records), dtype=np.int64), np.zeros(len(records), dtype=bool))
     name, scale = definition.time_field
     values = records[name]
+    if len(values) and values.max() <= LATEST_NS // scale and values.min() >= 0:
+        time = values.astype(np.int64, order="C")
+        time *= scale
+        return Column(time)
     sound = values <= LATEST_NS // scale
     if values.dtype.kind == "i":
         sound &= values >= 0
@@ -105,12 +119,6 @@ def _plain(values: NDArray[Any]) -> NDArray[Any]:
         return np.ascontiguousarray(values)
     with np.errstate(invalid="ignore"):
         return values.astype(np.float32)
-
-
-def as_double(values: NDArray[Any]) -> FloatArray:
-    """Convert numbers to double precision, a signalling NaN to a quiet one."""
-    with np.errstate(invalid="ignore"):
-        return values.astype(np.float64)
 
 
 def texts(values: NDArray[np.bytes_]) -> NDArray[np.str_]:

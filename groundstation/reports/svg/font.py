@@ -7,9 +7,9 @@ of which are narrower, so that what has room by these widths has room there.
 
 import struct
 from functools import cache, lru_cache
+from html import escape
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import escape
 
 from groundstation.chapters.wording import HIDDEN, clean
 
@@ -125,7 +125,7 @@ def written(
         place = f'transform="translate({x:.2f} {y:.2f})rotate(-90)"'
     size = f' font-size="{size_pt:g}"' if size_pt else ""
     side = f' text-anchor="{anchor}"' if anchor else ""
-    return f"<text {place}{side}{size}{look}>{escape(text.replace('  ', NO_BREAK + ' '))}</text>"
+    return f"<text {place}{side}{size}{look}>{escape(text.replace('  ', NO_BREAK + ' '), quote=False)}</text>"
 
 
 def middle(size_pt: float = SIZE_PT) -> float:

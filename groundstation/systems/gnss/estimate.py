@@ -134,7 +134,7 @@ def _sentence(every: Sequence[GnssReceiver], main: GnssReceiver) -> str:
 def _others_s(flight: Flight) -> tuple[FloatArray, ...]:
     """Return the times of the rows of each other sensor, sorted."""
     topics = [topic for topic in flight.topics() if kind_of(topic) in OTHER_SENSORS and len(flight[topic])]
-    return tuple(np.sort(flight.time_s(topic)) for topic in topics)
+    return tuple(np.sort(flight.time_s(topic), kind="stable") for topic in topics)
 
 
 def _one(

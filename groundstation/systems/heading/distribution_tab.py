@@ -71,15 +71,18 @@ def _growing(recorder: Recorder, growth: HeadingGrowth, bin_width: float, ceilin
     peaks = np.array([float(np.nanmax(density, initial=0.0)) for _, _, density in steps])
     too_high = np.flatnonzero(peaks > ceiling)
     first = int(too_high[-1]) + 1 if too_high.size else 0
-    stream = recorder.stream
+    stream, bins = recorder.stream, np.zeros(0)
     for time_s, centre, density in steps[first:]:
         time_ns = int(recorder.time_ns(time_s))
         stream.set_time(FLIGHT_TIME, duration=np.timedelta64(time_ns - recorder.start_ns, "ns"))
         if recorder.has_utc:
             stream.set_time(UTC, timestamp=np.datetime64(time_ns, "ns"))
-        width = np.full(len(centre), SLIM * bin_width)
-        left = centre - 0.5 * width
-        bars = rr.BarChart(density, abscissa=left, widths=width, color=(*colours.ANSWER[:3], FRONT))
+        if np.array_equal(centre, bins):  # what does not change holds from the first chart on
+            bars = rr.BarChart.from_fields(values=density)
+        else:
+            width = np.full(len(centre), SLIM * bin_width)
+            left, bins = centre - 0.5 * width, centre
+            bars = rr.BarChart(density, abscissa=left, widths=width, color=(*colours.ANSWER[:3], FRONT))
         stream.log(f"{PATH}/samples_so_far", bars)
     stream.reset_time()
     return float(peaks[first:].max(initial=0.0))

@@ -103,7 +103,7 @@ class NoiseBank:
 
     def _means(self, path: Path, starts: list[Initial]) -> FloatArray:
         pairs = zip(self.runs, starts, strict=True)
-        return np.stack([path.carried(run.model, "noise_bank", start.x) for run, start in pairs])
+        return np.stack([path.carried(run.model, start.x) for run, start in pairs])
 
     def _variances(self, lead_s: FloatArray, starts: list[Initial]) -> FloatArray:
         variances = []
@@ -128,8 +128,8 @@ class NoiseBank:
             density = run.noise.densities()
             phi = np.stack([run.model.transition_over(float(part)) for part in distinct])[which]
             added = np.stack([run.model.process_noise_over(float(part), density) for part in distinct])[which]
-            P = np.einsum("sij,gsjk,slk->sgil", phi, run.P[:, last], phi, optimize=True) + added[:, None]
-            x = np.einsum("sij,sjc->sic", phi, run.x[last])
+            x, P = phi @ run.x[last], phi @ run.P[:, last] @ phi.transpose(0, 2, 1) + added
+            P = P.transpose(1, 0, 2, 3)
             x[:, POSITION] = P[:, :, POSITION] = P[..., POSITION] = 0.0
             found.append(Initial(x, P))
         return found

@@ -11,7 +11,6 @@ from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.methods.ins_noise import InsNoise
-from groundstation.methods.kalman import filter as kalman
 from groundstation.methods.kalman.arrays import REJECTED
 from groundstation.results.forecast_methods import FORECAST_HORIZONS_MIN
 from groundstation.systems.inertial.coupled import (
@@ -74,9 +73,9 @@ def coupled_variance(run: CoupledRun, at: Int64Array, lead_s: FloatArray) -> Flo
     starts = run.P[at // run.every]
     starts[:, PLACES] = starts[:, :, PLACES] = 0.0
     for ahead in _ahead(run, at, lead_s, VARIANCE_STEP_S):
-        transition = RATES.transition(ahead.values, np.full(len(ahead.values), ahead.step_s), densities)
-        carried = kalman.forecast_variances(transition, ahead.step, starts[ahead.starts], ahead.every)
-        out[ahead.starts] = carried[:, :, PLACES]
+        use = ahead.starts
+        carried = RATES.variances(ahead.values, ahead.step, ahead.step_s, ahead.every, starts[use], densities)
+        out[use] = carried[:, :, PLACES]
     return out
 
 

@@ -124,10 +124,8 @@ def differences(
     if not len(ins):
         raise NotAssessableError("inertial", f"{ins_topic} never left alignment")
     findings = list(screening.unknown_values(flight, ins, gnss))
-    outliers, found = screening.ins_outliers(flight, ins, settings)
-    ins = ins.take(~outliers) if found else ins
-    resets = screening.ins_resets(flight, ins, settings)
-    findings += [*found, *resets.findings]
+    ins, resets = screening.ins_jumps(flight, ins, settings)
+    findings += resets.findings
     reset_ns = np.union1d(resets.time_ns, realigned_ns)
     motion = join(ins, gnss.time_ns, (*POSITION_FIELDS, *VELOCITY_FIELDS), largest_gap_s=settings.ins_gap_max_s)
     position, velocity = _position_difference(motion, gnss, _altitude(gnss)), _velocity_difference(motion, gnss)

@@ -80,6 +80,9 @@ def hindcast(
     for method in methods:
         if method == "noise_bank":
             forecasts[method], variances[method] = (bank or run_bank(run, settings)).forecast(path)
+        elif method == "raw_ins":
+            forecasts[method] = np.zeros((len(at), len(lead_s), run.x.shape[2]))
         else:
-            forecasts[method] = path.carried(run.model, method, start_states(method, run, at, settings))
+            model = None if method == "hold_velocity" else run.model
+            forecasts[method] = path.carried(model, start_states(method, run, at, settings))
     return Hindcast(at, path.start_s, path.lead_s, forecasts, built_up(run.epochs, at, lead_s), variances)

@@ -3,18 +3,19 @@
 The build-up is that shown by GNSS and that of states carried along by a model.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from groundstation.base.dataclasses import dataclass
-from groundstation.base.records import Int64Array
-from groundstation.methods.kalman.arrays import Drive
-from groundstation.methods.kalman.filter import forecast
-from groundstation.methods.kalman.transition import Transition
+from groundstation.base.records import Int64Array, frozen
+from groundstation.methods.kalman.filter import forecast_driven
 from groundstation.systems.inertial.filter import ChannelsRun, DifferenceEpochs
 from groundstation.systems.inertial.model import POSITION, SIZE, VELOCITY, ChannelModel, FloatArray
 
 NEAREST_S = 1.0
 PAST_FROM_S = 1800.0  # outages replayed from here on tell of later ones
+KEPT_ROWS = 64  # of the growths of the position made last: methods and sets of a bank share a few models
 MEMORY_S = 1200.0  # errors of outages that start nearer than this to each other are not independent
 
 
@@ -103,24 +104,39 @@ class Path:
         known = np.where(np.isfinite(epochs.position_m[at]), epochs.position_m[at], run.x[at, POSITION])
         return cls(start_s, np.asarray(lead_s), known, drag, step_s, every)
 
-    def carried(self, model: ChannelModel, method: str, states: FloatArray) -> FloatArray:
-        """Return what a method's states (s, 6, c) at the starts build up to, shape (s, l, c)."""
+    def carried(self, model: ChannelModel | None, states: FloatArray) -> FloatArray:
+        """Return what states (s, 6, c) at the starts build up to, shape (s, l, c).
+
+        Without a model the velocity is held.
+        """
         (count, _, channels), leads = states.shape, len(self.lead_s)
-        if method == "raw_ins" or not leads:
+        if not count or not leads:
             return np.zeros((count, leads, channels))
-        phi = np.eye(SIZE)
-        phi[POSITION, VELOCITY] = self.step_s  # the velocity is held and the model not used
-        if method != "hold_velocity":
-            phi = model.transition_over(self.step_s)
-        built = forecast(
-            Transition.blocks(phi[None], np.zeros((1, SIZE, SIZE)), 1),
-            np.zeros(self.every * leads, dtype=np.int64),
-            np.ascontiguousarray(states.transpose(1, 2, 0)),
-            self.known_m.T,
-            self.every,
-            Drive(POSITION, self.drag if channels == 2 else self.drag[:0], np.zeros((0, channels))),
-        )
+        rows = growth_rows(model, self.step_s, self.every * leads)
+        growth = (rows @ states.transpose(1, 2, 0).reshape(SIZE, -1)).reshape(len(rows), channels, count)
+        start = states[:, POSITION].T
+        if channels == self.drag.shape[1]:
+            built = forecast_driven(growth, self.drag, self.known_m.T, self.every, start)
+        else:
+            built = start + np.cumsum(growth, axis=0)[self.every - 1 :: self.every]
         return np.ascontiguousarray(built.transpose(2, 0, 1))
+
+
+@lru_cache(KEPT_ROWS)
+def growth_rows(model: ChannelModel | None, step_s: float, steps: int) -> FloatArray:
+    """Return by what the position grows over each step for each state at the start, shape (steps, 6).
+
+    No other state depends on the position. Without a model the velocity is held.
+    """
+    phi = np.eye(SIZE)
+    if model is None:
+        phi[POSITION, VELOCITY] = step_s
+    else:
+        phi = model.transition_over(step_s)
+    rows = (phi[POSITION] - np.eye(SIZE)[POSITION])[None]
+    while len(rows) < steps:  # phi is over as many steps as there are rows
+        rows, phi = np.concatenate([rows, rows @ phi]), phi @ phi
+    return frozen(rows[:steps])
 
 
 def past_mean(

@@ -56,7 +56,7 @@ def plan_replay(run: ChannelsRun, settings: InertialSettings) -> ReplayPlan:
     time_s = run.epochs.time_s[run.epochs.has_gnss]
     begin, end = (float(time_s[0]), float(time_s[-1])) if len(time_s) else (0.0, 0.0)
     first, step = settings.first_start_s, settings.start_step_s
-    if _judged(run, first, step, HALF_HOUR_MIN) < LEAST_STARTS:
+    if _judged(run, first, step, HALF_HOUR_MIN)[0] < LEAST_STARTS:
         first = min(first, begin + max(LEAST_PAST_S, SHORT_SHARE * (end - begin)))
         step = min(step, max(10.0, (end - first) / 20.0))
     past_min = seconds_covered(time_s[time_s <= first], settings.outage_s) / 60.0
@@ -67,18 +67,19 @@ def plan_replay(run: ChannelsRun, settings: InertialSettings) -> ReplayPlan:
             f"({run.model.schuler_period_min:.1f} min): the sigma depends on the class"
         )
     past = int(max(first - begin - PAST_FROM_S, 0.0) / step)
+    judged = _judged(run, first, step, *FORECAST_HORIZONS_MIN)
     horizons = tuple(
-        float(horizon) for horizon in FORECAST_HORIZONS_MIN if _judged(run, first, step, horizon) >= LEAST_STARTS
+        float(horizon) for horizon, count in zip(FORECAST_HORIZONS_MIN, judged, strict=True) if count >= LEAST_STARTS
     )
     lead_s = leads_of(LEAD_STEP_S, 60.0 * max(horizons, default=1.0))
     at = start_epochs(run.epochs, first - past * step, step)
     return ReplayPlan(first, step, at, horizons, lead_s, not reason, reason)
 
 
-def _judged(run: ChannelsRun, first_s: float, step_s: float, horizon_min: float) -> int:
-    """Count the starts that GNSS could judge at a horizon."""
-    shown = built_up(run.epochs, start_epochs(run.epochs, first_s, step_s), np.array([60.0 * horizon_min]))
-    return int(np.isfinite(shown).all(axis=2).sum())
+def _judged(run: ChannelsRun, first_s: float, step_s: float, *horizons_min: float) -> list[int]:
+    """Count the starts that GNSS could judge at some horizons."""
+    shown = built_up(run.epochs, start_epochs(run.epochs, first_s, step_s), 60.0 * np.array(horizons_min))
+    return [int(count) for count in np.isfinite(shown).all(axis=2).sum(axis=0)]
 
 
 def map_grid(run: ChannelsRun, settings: InertialSettings) -> tuple[Int64Array, FloatArray]:

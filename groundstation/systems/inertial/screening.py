@@ -28,7 +28,7 @@ LISTED = 3
 
 @dataclass(frozen=True)
 class Resets:
-    """Times of the first sample after each reset of the INS, and the findings about them."""
+    """Times of the first sample after each reset of the INS, and the findings on it and on single samples."""
 
     time_ns: Int64Array
     findings: tuple[Finding, ...]
@@ -50,32 +50,29 @@ def unknown_values(flight: Flight, ins: Table, gnss: Table) -> Iterator[Finding]
                 yield Finding("warn", "inertial.unknown", text, table.topic, f"from {first:.1f} s", int(missing.sum()))
 
 
-def ins_outliers(flight: Flight, ins: Table, settings: InertialSettings) -> tuple[BoolArray, list[Finding]]:
-    """Find single INS samples whose position jumps and jumps back at once: no reset.
+def ins_jumps(flight: Flight, ins: Table, settings: InertialSettings) -> tuple[Table, Resets]:
+    """Return the INS without single samples that jump and jump back at once, and its resets.
 
-    Returns a mask (n,) and the finding.
+    A reset is a step of the INS position that its own velocity does not explain.
     """
-    at = _steps(ins, settings.jump_m)
-    mask, rows = np.zeros(len(ins), dtype=bool), at[:-1][np.diff(at) == 1]
-    mask[rows] = True
-    if not rows.size:
-        return mask, []
-    times = flight.seconds(ins.time_ns[rows])
-    text = f"INS position off by {settings.jump_m:.0f} m or more in single samples: not used"
-    place = f"{times[0]:.1f} to {times[-1]:.1f} s"
-    return mask, [Finding("warn", "inertial.ins_outlier", text, ins.topic, place, int(rows.size))]
-
-
-def ins_resets(flight: Flight, ins: Table, settings: InertialSettings) -> Resets:
-    """Steps of the INS position that its own velocity does not explain."""
-    at = _steps(ins, settings.jump_m)
     findings = []
+    at = _steps(ins, settings.jump_m)
+    outliers = at[:-1][np.diff(at) == 1]
+    if outliers.size:
+        times = flight.seconds(ins.time_ns[outliers])
+        text = f"INS position off by {settings.jump_m:.0f} m or more in single samples: not used"
+        place = f"{times[0]:.1f} to {times[-1]:.1f} s"
+        findings.append(Finding("warn", "inertial.ins_outlier", text, ins.topic, place, int(outliers.size)))
+        is_kept = np.ones(len(ins), dtype=bool)
+        is_kept[outliers] = False
+        ins = ins.take(is_kept)
+        at = _steps(ins, settings.jump_m)
     if at.size:
         times = flight.seconds(ins.time_ns[at])
         listed = ", ".join(f"{time:.1f} s" for time in times[:LISTED]) + (" ..." if len(times) > LISTED else "")
         text = f"INS position jumps by {settings.jump_m:.0f} m or more against its own velocity: treated as a reset"
         findings.append(Finding("warn", "inertial.ins_reset", text, ins.topic, listed, int(at.size)))
-    return Resets(ins.time_ns[at], tuple(findings))
+    return ins, Resets(ins.time_ns[at], tuple(findings))
 
 
 def unbelieved(

@@ -134,7 +134,8 @@ class LeadGrowth:
 
         m^2, shape (s, l).
         """
-        carried = np.einsum("la,sab,lb->sl", self.rows, covariance, self.rows, optimize=True)
+        products = (self.rows[:, :, None] * self.rows[:, None, :]).reshape(len(self.rows), -1)
+        carried = covariance.reshape(len(covariance), -1) @ products.T
         return np.asarray(np.maximum(carried, 0.0) + self.added_m2)
 
 

@@ -139,10 +139,11 @@ def _velocity(flight: Flight, unit: Table, sensor: Table, settings: LatencySetti
     arms = np.gradient(_rotation(columns, _nose(columns, north, east))[:, :2, :], time_s, axis=0)
 
     def build(base: FloatArray) -> FloatArray:
-        velocity = base[..., :2]
-        turned = np.stack([-base[..., 1], base[..., 0]], axis=-1)
-        arm = base[..., 2:].reshape(*base.shape[:-1], 2, 3)
-        return np.concatenate([velocity[..., None], velocity[..., None], turned[..., None], arm], axis=-1)
+        built = np.empty((*base.shape[:-1], 2, 6))
+        built[..., 0] = built[..., 1] = base[..., :2]
+        built[..., 0, 2], built[..., 1, 2] = -base[..., 1], base[..., 0]
+        built[..., 3:] = base[..., 2:].reshape(*base.shape[:-1], 2, 3)
+        return built
 
     base = np.column_stack([north, east, arms.reshape(-1, 6)])
     at_s, measured = _averaged(flight, sensor, VELOCITY, settings.other_step_s)
@@ -188,7 +189,7 @@ def _field(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings
     known = bare.covers(at_s, 0.0)
     if np.count_nonzero(known) < LEAST_SAMPLES:
         raise NotComparableError("too few samples while the attitude is known")
-    turning, seen = bare.at(at_s[known])[0].reshape(-1, 3, 3), values[known]
+    turning, seen = bare.signal_at(at_s[known]).reshape(-1, 3, 3), values[known]
     turning, seen = turning - turning.mean(axis=0), seen - seen.mean(axis=0)
     constant = np.linalg.lstsq(turning.reshape(-1, 3), seen.reshape(-1), rcond=1e-6)[0]
     size = max(float(np.linalg.norm(constant)), 1.0)
@@ -196,10 +197,12 @@ def _field(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings
     def build(base: FloatArray) -> FloatArray:
         turn = base.reshape(*base.shape[:-1], 3, 3)
         turned = turn @ constant
-        iron = np.zeros((*turned.shape, 9))
+        built = np.zeros((*turned.shape, 13))
+        built[..., 0] = turned
         for axis in range(3):
-            iron[..., axis, 3 * axis : 3 * axis + 3] = turned
-        return np.concatenate([turned[..., None], iron, size * turn], axis=-1)
+            built[..., axis, 1 + 3 * axis : 4 + 3 * axis] = turned
+        np.multiply(size, turn, out=built[..., 10:])
+        return built
 
     sigma = np.full(12, settings.iron_sigma)
     return SignalComparison(ReferenceSignals(time_s, base, build, settings.gap_max_s), at_s, values, sigma, "nT")

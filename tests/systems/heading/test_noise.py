@@ -1,12 +1,14 @@
 """The noise model's filter against dense matrices, and the interval made from it."""
 
 from dataclasses import replace
+from functools import partial
+from threading import current_thread
 
 import numpy as np
 import pytest
 
 from groundstation.methods.intervals import mixture_quantile
-from groundstation.methods.taxi_error import noise
+from groundstation.methods.taxi_error import interval, noise
 from groundstation.methods.taxi_error.interval import (
     NO_STANDSTILL,
     HeadingDifferences,
@@ -83,6 +85,21 @@ def test_each_draw_is_judged_as_if_it_were_alone() -> None:
     for draw, theta in enumerate(thetas):
         alone = target.evaluate(theta[None, :], target.last)
         assert all(np.array_equal(a[draw], b[0]) for a, b in zip(together, alone, strict=True))
+
+
+@pytest.mark.parametrize("count", [40, 41, 115, 200])
+def test_draws_on_two_cores_are_judged_as_on_one(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(count)
+    data = random_differences(rng)
+    thetas = np.array([draw_theta(rng) for _ in range(count)])
+    found, threads, evaluate = [], set[str](), noise.evaluate
+    monkeypatch.setattr(noise, "evaluate", lambda *a: threads.add(current_thread().name) or evaluate(*a))
+    for has_two in (False, True):
+        monkeypatch.setattr(interval, "has_two_cores", partial(bool, has_two))
+        found.append(_Target(NO_STANDSTILL, data).evaluate(thetas, np.array([20, 60])))
+    assert ("half" in threads) == (count > noise.LANES)
+    for one, other in zip(*found, strict=True):
+        assert np.array_equal(one, other)
 
 
 def test_weights_are_the_row_sums_of_the_inverse_covariance() -> None:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import UsageError
-from groundstation.methods.kalman import filter as kalman
 from groundstation.pipeline.verbs.catalogue import catalogue
 from groundstation.pipeline.verbs.synthesis import study_to
 from groundstation.results.figures import FigureData
@@ -282,12 +281,11 @@ def test_every_study_is_listed_and_no_other_is_run(tmp_path: Path) -> None:
 def test_variance_carried_back_from_the_leads_is_that_carried_forward() -> None:
     """Any entries of A, two starts, three sets of noise: sigma to rounding."""
     rng = np.random.default_rng(4)
-    values, seconds = 1e-4 * rng.standard_normal((200, len(coupled.PATTERN))), np.full(200, VARIANCE_STEP_S)
+    values = 1e-4 * rng.standard_normal((200, len(coupled.PATTERN)))
     step = rng.integers(0, 200, (2, 10 * LEADS))
     half = rng.standard_normal((3, 2, coupled.SIZE, coupled.SIZE))
     P, densities = half @ np.swapaxes(half, 2, 3), rng.uniform(0.0, 1.0, (3, coupled.SIZE))
     found = grown_variances(StepsAhead(slice(None), values, step, VARIANCE_STEP_S, 10), P, densities)
     for place in range(3):
-        transition = coupled.RATES.transition(values, seconds, densities[place])
-        forward = kalman.forecast_variances(transition, step, P[place], 10)
+        forward = coupled.RATES.variances(values, step, VARIANCE_STEP_S, 10, P[place], densities[place])
         assert found[place] == pytest.approx(forward[:, :, coupled.CHANNELS[:, 0]], rel=1e-9)

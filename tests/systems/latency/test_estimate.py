@@ -13,7 +13,7 @@ from groundstation.base.errors import NotAssessableError, SettingsError
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
 from groundstation.methods.lag.settings import LatencySettings
-from groundstation.methods.lag.windows import ReferenceSignals
+from groundstation.methods.lag.windows import Noise, ReferenceSignals, Windows, noise_of
 from groundstation.pipeline.one_flight.analyse import Answered, known_of, run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
@@ -161,6 +161,18 @@ def test_series_knows_where_it_has_gaps() -> None:
     value, rate = series.at(np.array([1.0, 9.0]))
     assert value[..., 0, 0].tolist() == [1.0, 81.0]
     assert rate[0, 0, 0] == pytest.approx(2.0)
+    assert np.array_equal(series.signal_at(np.array([1.0, 9.0])), value)
+
+
+def test_no_noise_is_tried_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The three searches share one grid: the best of one is met again in the next."""
+    rng, tried = np.random.default_rng(3), list[Noise]()
+    time_s = np.arange(240.0).reshape(8, 30)
+    white = Windows(time_s, rng.normal(size=(8, 30, 1)), np.ones((8, 30)))
+    whitener = Windows.whitener
+    monkeypatch.setattr(Windows, "whitener", lambda self, noise: tried.append(noise) or whitener(self, noise))
+    found = noise_of(white, white.values, 2)
+    assert found.sigma == pytest.approx(1.0, abs=0.1) and len(tried) == len(set(tried)) > 10
 
 
 # Not observable

@@ -25,7 +25,7 @@ from groundstation.pipeline.many_flights.processes.crew import AnyJob, Work
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 
-TASKS_PER_PROCESS = 32  # Rerun leaves a few threads behind for every recording
+TASKS_PER_PROCESS = 128  # a process grows by a megabyte with every recording
 RESULTS_PER_PROCESS = 512  # without recordings a process does not grow, and a new one imports for a second
 MOST_EVENT_CHARACTERS = 160  # of a name or a text: an event is one write to a pipe, 4096 bytes that nothing cuts in two
 LOOK_EVERY_S, END_S = 0.2, 5.0  # for jobs that take too long; given to their processes to end
