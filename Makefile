@@ -8,6 +8,8 @@ RUNTIME := $(VENV)/.runtime
 DEV     := $(VENV)/.dev
 SITE    := $(VENV)/.site
 MYPY_NUM_WORKERS ?= 2
+# Both parse every module: in one process once.
+STYLE_TESTS := tests/test_architecture.py tests/test_dependencies.py
 # Bytecode is kept: the tests start hundreds of processes. It comes with the first import, and only of what is imported.
 PIP     := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 unexport PYTHONDONTWRITEBYTECODE
@@ -52,7 +54,7 @@ types: $(DEV)
 style: $(DEV)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/python -m pytest -q tests/test_architecture.py
+	$(BIN)/python -m pytest -q $(STYLE_TESTS)
 
 # Beside .venv: the suite sees groundstation as it is installed, without readers of others.
 robots: $(DEV) ## tests of the plug-in benchmarks/recorded_robots, installed below build/

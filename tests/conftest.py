@@ -37,6 +37,15 @@ def pytest_collection() -> Generator[None, object, object]:
         return (yield)
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file(file_path: Path) -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
+    """Leave out the search for examples in files that have none: in 2000 files it took 3 s of each worker."""
+    found = yield
+    if file_path.suffix == ".py" and ">>>" not in file_path.read_text(encoding="utf-8"):
+        return [one for one in found if type(one) is pytest.Module]
+    return found
+
+
 @pytest.fixture(scope="module")
 def headless_viewer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[Path], ViewerClient]]:
     """Start the real viewer on a recording, without a window; it ends after the module's last test.

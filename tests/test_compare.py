@@ -66,7 +66,7 @@ def groundstation(*arguments: str) -> tuple[int, str, str]:
 
 def ran(log: Path, out: Path, **settings: Any) -> Path:
     """The folder of a log that was run."""
-    outcome = run_flight(Job(log, out, Configuration(settings), with_pdf=False))
+    outcome = run_flight(Job(log, out, Configuration(settings), only_results=True))
     assert outcome.folder, outcome.text
     return Path(outcome.folder)
 

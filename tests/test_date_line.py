@@ -35,7 +35,7 @@ from tests.recording_contents import Contents
 from tests.systems.landing.test_approaches import EXACT, PLAIN, only
 from tests.told import write_recording
 from tests.viewer_example import make_flight, make_results
-from tests.viewer_shots import SATURATED, colourful, picture, settled
+from tests.viewer_shots import SATURATED, SMALL, colourful, picture, settled
 
 KML, GX = "{http://www.opengis.net/kml/2.2}", "{http://www.google.com/kml/ext/2.2}"
 GPX = "{http://www.topografix.com/GPX/1/1}"
@@ -154,9 +154,9 @@ def test_the_viewer_shows_the_flight_on_both_sides_of_the_date_line(
         stream.send_blueprint(rrb.Blueprint(rrb.Tabs(contents=[view]), auto_views=False))
         stream.disconnect()
     client = headless_viewer(tmp_path / "map.rrd")
-    settled(client)  # until the blueprint is there the view is another
+    settled(client, max_size=SMALL)  # until the blueprint is there the view is another
     (shown,) = client.get_state().views
-    pixels = picture(settled(client, shown.view_id))
+    pixels = picture(client.take_screenshot(shown.view_id))
     assert colourful(pixels) > 400
     rows, columns = np.nonzero(pixels.max(axis=2) - pixels.min(axis=2) > SATURATED)
     assert np.ptp(rows) > 0.2 * pixels.shape[0], "zoomed in on the flight"
