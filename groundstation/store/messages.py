@@ -84,7 +84,7 @@ class ChunkMessages:
         return np.ndarray((len(self),), dtype, self.buffer.data, int(self.starts[0]) + offset, (self.stride,))
 
     def is_alike(self, start: int, stop: int) -> bool:
-        """Tell whether the bytes from ``start`` to ``stop`` of every record are those of the first.
+        """Tell whether bytes ``start`` to ``stop`` of each record are those of the first.
 
         The records must have an even stride.
         """

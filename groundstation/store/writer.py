@@ -249,7 +249,10 @@ class StoreWriter:
         return _Finished((head, data, messages), 0, length + len(messages), chunk.topic, index)
 
     def _keep(self, chunk: _Finished) -> None:
-        """Keep a compressed chunk in memory; the oldest go to the spool when there are more bytes than memory for."""
+        """Keep a compressed chunk in memory.
+
+        The oldest go to the spool when there are more bytes than memory for.
+        """
         assert self._spool is not None
         self._chunks.append(chunk)
         self._bytes += chunk.nbytes
