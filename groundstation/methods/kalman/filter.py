@@ -376,5 +376,6 @@ def forecast_driven(
 
     built_up = np.zeros((len(growth) // every, *start.shape))
     grown, mixed, before = (frozen(np.ascontiguousarray(part)) for part in (growth, mix, known))
-    runs.run_driven(grown, mixed, before, every, np.stack([start, start]), built_up)
+    x = np.array([start, start], order="C")  # in one piece, or the kept machine code does not take it
+    runs.run_driven(grown, mixed, before, every, x, built_up)
     return built_up

@@ -110,7 +110,10 @@ def _ahead(run: CoupledRun, at: Int64Array, lead_s: FloatArray, longest_s: float
 def steps_ahead(
     differences: InsDifferences, noise: InsNoise, start_s: FloatArray, lead_s: FloatArray, longest_s: float
 ) -> Iterator[StepsAhead]:
-    """Steps of at most ``longest_s`` ahead of some times, so many starts at once as memory allows."""
+    """Yield steps of at most ``longest_s`` ahead of some times, a few starts at once.
+
+    So many of them as memory allows.
+    """
     if not len(lead_s):
         return
     every = max(1, round(float(lead_s[0]) / longest_s))

@@ -86,7 +86,10 @@ class CraftMotion:
 
 
 def _columns_at(differences: InsDifferences, time_s: FloatArray, *, is_strapdown: bool) -> FloatArray:
-    """Latitude, altitude, both velocities and heading (rad) of the INS at some times, shape (5, n)."""
+    """Return the motion of the INS at some times, shape (5, n).
+
+    Latitude and altitude, velocity north and east, heading in radians.
+    """
     own_s = differences.epochs.time_s
     known = [np.interp(time_s, own_s, column) for column in differences.motion_known]
     heading = np.interp(time_s, own_s, differences.unwrapped_heading_rad) if is_strapdown else np.zeros(len(time_s))

@@ -118,14 +118,15 @@ def _of_model(replay: Hindcast, coupled: CoupledRun, settings: InertialSettings)
 def _with_own_variance(
     replay: Hindcast, together_m: FloatArray, coupled: CoupledRun, settings: InertialSettings
 ) -> Hindcast:
-    """Return the replay with the coupled last estimate and its variance, if the settings choose it."""
+    """Return the replay with the coupled last estimate and its variance, where chosen."""
     if settings.model == "separate":
         return replay
-    forecast, own = (
-        {"last_estimate": together_m},
-        {"last_estimate": coupled_variance(coupled, replay.at, replay.lead_s)},
+    own_m2 = coupled_variance(coupled, replay.at, replay.lead_s)
+    return replace(
+        replay,
+        forecast_m=replay.forecast_m | {"last_estimate": together_m},
+        variance_m2=replay.variance_m2 | {"last_estimate": own_m2},
     )
-    return replace(replay, forecast_m=replay.forecast_m | forecast, variance_m2=replay.variance_m2 | own)
 
 
 def _lengths_that_fit(plan: ReplayPlan) -> tuple[float, ...]:

@@ -124,9 +124,9 @@ class Path:
 
 @lru_cache(KEPT_ROWS)
 def growth_rows(model: ChannelModel | None, step_s: float, steps: int) -> FloatArray:
-    """Return by what the position grows over each step for each state at the start, shape (steps, 6).
+    """Return the growth of the position over each step for each state at the start.
 
-    No other state depends on the position. Without a model the velocity is held.
+    Shape (steps, 6). No other state depends on the position. Without a model the velocity is held.
     """
     phi = np.eye(SIZE)
     if model is None:

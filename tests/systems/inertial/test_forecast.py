@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from groundstation.results.forecast_methods import FORECAST_METHODS
+from groundstation.systems.inertial import leads as forecast_leads
 from groundstation.systems.inertial.estimate import Estimation, estimate_ins_errors
 from groundstation.systems.inertial.filter import ChannelsRun, DifferenceEpochs, initial_of, run_filter
 from groundstation.systems.inertial.forecast import assess_forecast
 from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.systems.inertial.hindcast import hindcast
 from groundstation.systems.inertial.leads import leads_of, start_epochs
+from groundstation.systems.inertial.model import POSITION, SIZE, ChannelModel
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.skill import claimed_sigma
 from groundstation.systems.inertial.starts import start_states
@@ -203,3 +205,24 @@ def test_gaps_of_the_real_flight_are_near_the_published_ones(real_forecast: Fore
     for row in real_forecast.gaps:
         if row.method == "rts":
             assert row.max_error_rms_m < shortfall * RTS_GAPS[row.length_min]
+
+
+@pytest.mark.parametrize("channels", [1, 2])
+def test_forecast_is_the_model_step_by_step_with_the_drag_of_the_sphere(channels: int) -> None:
+    """Any states and drags of two starts, against the whole transition applied at each step."""
+    rng = np.random.default_rng(8)
+    model, count, leads, every = ChannelModel.at(50.0, 9000.0, 1e-3), 2, 4, 3
+    states = rng.standard_normal((count, SIZE, channels)) * np.array([10.0, 1.0, 1e-4, 1e-7, 1e-11, 1e-7])[:, None]
+    known, drag = rng.standard_normal((count, channels)), 1e-3 * rng.standard_normal((every * leads, 2, 2, count))
+    path = forecast_leads.Path(np.zeros(count), 30.0 * np.arange(1.0, leads + 1.0), known, drag, 10.0, every)
+    phi, x, expected = model.transition_over(10.0), states, []
+    for step in range(every * leads):
+        moved = np.einsum("ijs,sj->si", drag[step], x[:, POSITION] + known) if channels == 2 else 0.0
+        x = phi @ x
+        x[:, POSITION] += moved
+        if (step + 1) % every == 0:
+            expected.append(np.array(x[:, POSITION]))
+    assert path.carried(model, states) == pytest.approx(np.stack(expected, axis=1), rel=1e-12)
+    held = path.carried(None, states) - path.carried(None, np.where(np.arange(SIZE)[:, None] == 1, 0.0, states))
+    if channels == 1:
+        assert held[:, :, 0] == pytest.approx(path.lead_s * states[:, 1], rel=1e-12)
