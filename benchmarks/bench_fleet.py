@@ -1,8 +1,9 @@
 """Many flights: one and two worker processes, a Dask cluster beside them, memory of a worker, killed runs continued.
 
 ``bench_fleet.py [FLIGHTS]``, 500 without it: wall seconds; other programs slow all of them. ``bench_fleet.py FLIGHTS
-stages`` tells what one process spends on a flight, by stage, with everything and with results alone. With ``--pdf``
-behind them PDFs are written too.
+stages`` tells what one process spends on a flight, by stage, with everything and with results alone, and results alone
+of flights with an INS; a limit beside them is what compiled loops and Parquet take of it. With ``--pdf`` behind them
+PDFs are written too.
 """
 
 import filecmp
@@ -14,13 +15,17 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 import psutil
+from pyarrow import parquet
 
 from benchmarks.record import Book, Goal
+from groundstation.base.machine_code import Linked
 from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.verbs.synthesis import simulate_to
@@ -29,6 +34,9 @@ COMMAND = [sys.executable, "-m", "groundstation"]
 PDF = [one for one in sys.argv[1:] if one == "--pdf"]
 FLIGHTS, DAMAGED_SHARE, AIRCRAFT = 500, 0.03, 5
 ONE_GOAL, TWO_GOAL = Goal(300.0), Goal(1.9, "at least")  # of 500 flights; of two workers
+# Of results alone on one core: 500 flights in 120 s, and what NGAFID's baseline takes of a short flight
+ALONE_GOAL, INS_GOAL = Goal(0.24), Goal(0.3)
+INS_SCENARIO = "ins-fleet"
 SCENARIOS = ("taxi-good", "taxi-short", "taxi-drift")
 KILLS, FLIGHTS_KILLED = 10, 20
 IDENTICAL = {".html", ".pdf", ".csv"}
@@ -82,19 +90,52 @@ def timed(arguments: list[str]) -> tuple[float, float, str]:
 
 def stages(book: Book, logs: Path, root: Path, flights: int) -> None:
     """Record processor seconds a flight by stage, in this process alone: everything, then results alone."""
-    for name, only_results in (("everything", False), ("results alone", True)):
-        started = time.process_time()
-        with mock.patch("time.perf_counter", time.process_time):  # what outcomes tell is then processor time
-            whole = {"only_results": True} if only_results else {"with_pdf": bool(PDF)}
-            done = run_many([logs], root / name, Configuration(), jobs=1, **whole)
-        whole_s = time.process_time() - started
-        spent: Counter[str] = Counter()
-        for outcome in done:
-            spent.update(outcome.times_s)
-        spent["beside the flights"] = whole_s - sum(spent.values())
-        book.figure(f"one of {flights} flights, {name}", whole_s / flights, "s")
-        for stage, seconds in spent.items():
-            book.figure(f"one of {flights} flights, {name}: {stage}", seconds / flights, "s")
+    simulate_to(INS_SCENARIO, root / "ins")
+    of_ins = sorted(path for path in (root / "ins").glob("*.csv") if "truth" not in path.name)
+    shown = {"with_pdf": bool(PDF)}
+    by_stage(book, f"one of {flights} flights, everything", [logs], root / "everything", shown)
+    what, alone = "flights, results alone", {"only_results": True}
+    by_stage(book, f"one of {flights} {what}", [logs], root / "alone", alone, ALONE_GOAL)
+    by_stage(book, f"one of {len(of_ins)} {INS_SCENARIO} {what}", of_ins, root / "of_ins", alone, INS_GOAL)
+
+
+def by_stage(
+    book: Book, what: str, logs: list[Path], out: Path, options: dict[str, bool], goal: Goal | None = None
+) -> None:
+    """Record processor seconds a flight of a run, by stage, and what of it no Python can save."""
+    spent: Counter[str] = Counter()
+    in_loops, in_parquet = measured(Linked.__call__), measured(parquet.write_table)
+    started = time.process_time()
+    with (
+        mock.patch("time.perf_counter", time.process_time),  # what outcomes tell is then processor time
+        mock.patch.object(Linked, "__call__", in_loops),
+        mock.patch.object(parquet, "write_table", in_parquet),
+    ):
+        done = run_many(logs, out, Configuration(), jobs=1, **options)
+    whole_s = time.process_time() - started
+    for outcome in done:
+        spent.update(outcome.times_s)
+    spent["beside the flights"] = whole_s - sum(spent.values())
+    book.figure(what, whole_s / len(done), "s", goal=goal)
+    for stage, seconds in spent.items():
+        book.figure(f"{what}: {stage}", seconds / len(done), "s")
+    least = sum(in_loops.seconds) + sum(in_parquet.seconds)
+    book.figure(f"limit: compiled loops and Parquet, {what}", least / len(done), "s")
+
+
+def measured(function: Callable[..., Any]) -> Any:
+    """Return a function that keeps the processor seconds of its calls in ``seconds``."""
+
+    def timed_one(*arguments: Any, **options: Any) -> Any:
+        begin = time.process_time()
+        try:
+            return function(*arguments, **options)
+        finally:
+            seconds.append(time.process_time() - begin)
+
+    seconds: list[float] = []
+    timed_one.seconds = seconds  # type: ignore[attr-defined]
+    return timed_one
 
 
 def largest_bytes(process: psutil.Process) -> int:

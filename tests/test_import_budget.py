@@ -76,6 +76,11 @@ def test_a_purpose_is_answered_without_estimating() -> None:
     assert loaded(BY_VERB, *asked, names=names) == []
 
 
+def test_a_trajectory_without_an_imu_is_refused_without_scipy() -> None:
+    refused = BY_VERB.replace("not stop.code", "stop.code == 4")
+    assert loaded(refused, "check", str(SAMPLE), "--for", "trajectory", names=("scipy", "cattrs")) == []
+
+
 def test_a_log_is_opened_without_what_it_does_not_need() -> None:
     assert loaded(BY_OPEN, str(SAMPLE), names=(*NOT_NEEDED, "pyarrow.csv", "typer")) == []
 
@@ -89,7 +94,8 @@ def test_compiled_loops_are_found_again_without_their_compiler(suffix: str, tmp_
     convert = ["convert", str(log), "-q", "--force", "-o", str(tmp_path / "out.mcap")]
     assert CliRunner().invoke(app, convert).exit_code == 0  # compiles, where that was not done before
     of_tables = ("groundstation.readers.csv_profile", "groundstation.readers.flat_csv", "groundstation.readers.profile")
-    not_needed = (*NOT_NEEDED, "pyarrow", *(of_tables if suffix in ("ulg", "BIN") else ()))
+    of_ulog = (*of_tables, "numpy.ma")
+    not_needed = (*NOT_NEEDED, "pyarrow", "importlib.metadata", *{"ulg": of_ulog, "BIN": of_tables}.get(suffix, ()))
     assert loaded(BY_VERB, *convert, names=not_needed) == []
 
 

@@ -18,9 +18,9 @@ def has_two_cores() -> bool:
 
 
 def both(first: Callable[[], object], second: Callable[[], object]) -> None:
-    """Do two things at once, the second in a thread of its own; for work in compiled loops, which run beside Python.
+    """Run two functions at once, the second in a thread of its own.
 
-    Raises what one of them raises, when both have ended.
+    It is for work in compiled loops, which run beside Python. Raises what one of them raises, when both have ended.
 
     Examples
     --------

@@ -1,6 +1,6 @@
-"""Distinct values and the median, by sorting.
+"""Distinct values, the median and other quantiles, by sorting.
 
-``np.unique`` and ``np.median`` import numpy's masked arrays, which nothing else of a conversion needs.
+``np.unique``, ``np.median`` and ``np.quantile`` import numpy's masked arrays, which nothing else of a conversion needs.
 """
 
 import math
@@ -41,3 +41,23 @@ def median(values: NDArray[np.floating]) -> float:
     if not count or np.isnan(ordered[-1]):
         return math.nan
     return float(0.5 * (ordered[(count - 1) // 2] + ordered[count // 2]))
+
+
+def quantile(values: NDArray[np.floating | np.integer], share: float) -> float:
+    """Return the value below which a share of others lies, as ``np.quantile`` does.
+
+    It is linear between two of them; NaN where any value is.
+
+    Examples
+    --------
+    >>> quantile(np.array([5, 1, 4, 2]), 0.5), quantile(np.array([4.0, 1.0, np.nan]), 0.9)
+    (3.0, nan)
+    """
+    ordered = np.sort(values, axis=None)
+    if not len(ordered) or np.isnan(ordered[-1]):
+        return math.nan
+    at = share * (len(ordered) - 1)
+    low = math.floor(at)
+    below, above = ordered[low], ordered[min(low + 1, len(ordered) - 1)]
+    part = at - low
+    return float(below + (above - below) * part if part < 0.5 else above - (above - below) * (1.0 - part))

@@ -97,7 +97,7 @@ class ClockModel:
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
     def is_shift(self, first: int, last: int) -> bool:
-        """Tell whether corrected time is device time and the one offset of all, for records of such places."""
+        """Tell whether records between two places are moved by one offset, and none is placed."""
         if len(self.starts) > 1:
             return False
         low, high = self.placed_index.searchsorted((first, last + 1))

@@ -91,7 +91,7 @@ def quantile(values: Int64Array, share: float) -> float:
 
 
 def quantiles(values: Int64Array, shares: Sequence[float]) -> list[float]:
-    """Return several quantiles of integers in any order, as :func:`quantile` does, by one selection.
+    """Return several quantiles, each as :func:`quantile` does, by one selection.
 
     Examples
     --------

@@ -68,7 +68,10 @@ class _Series:
         return all(name in self.columns and bool(np.isfinite(self.columns[name]).any()) for name in names)
 
     def known(self, *names: str, beside: tuple[str, ...] = ()) -> "_Series":
-        """Return the samples in which all of these fields are known, one for each time, with others ``beside``."""
+        """Return the samples in which all of these fields are known, one for each time.
+
+        Fields ``beside`` them come along, known or not.
+        """
         mask = np.all([np.isfinite(self.columns[name]) for name in names], axis=0)
         mask &= np.concatenate([[True], np.diff(self.time_s) > 0.0]) if len(self.time_s) else mask
         kept = {name: self.columns[name][mask] for name in (*names, *beside) if name in self.columns}

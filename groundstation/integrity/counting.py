@@ -14,6 +14,7 @@ from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.toml_settings import number
 from groundstation.base.units import NS_PER_S
+from groundstation.integrity import time_passes
 from groundstation.integrity.clock import ClockModel, interpolated, start_of, zero_of
 from groundstation.integrity.clock_steps import middle_of
 from groundstation.integrity.thinning import Measured, Thinner
@@ -131,7 +132,7 @@ def estimate_counting_clock(
 
 def _measured(time: Int64Array, tolerance_ns: int, run_records: int) -> Measured:
     """Return the figures of records that are believed."""
-    if passes_over(time):
+    if passes_over(time, least=time_passes.MANY_IN_ALL):
         return Thinner(tolerance_ns, run_records).measured(time)
     steps = np.diff(time)
     lateness_ns = int((np.maximum.accumulate(time) - time).max())

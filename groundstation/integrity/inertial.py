@@ -42,7 +42,10 @@ class _End:
         return True
 
     def add(self, values: FloatArray, most: float, *, is_low: bool = False) -> None:
-        """Count the samples at the largest value, ``most`` of these; of values below zero where ``is_low``."""
+        """Count the samples at the largest value, ``most`` of these.
+
+        ``is_low``: the lower end is meant, and ``most`` is that of the values with the other sign.
+        """
         if most > self.value * (1.0 + SAME):
             self.value, self.count, self.run = most, 0, 0
         least = self.value * (1.0 - SAME)

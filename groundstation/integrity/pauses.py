@@ -16,6 +16,7 @@ from groundstation.base.dataclasses import dataclass
 from groundstation.base.gaps import Pause
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.signals import EVENT_SEPARATOR, is_canonical, kind_of
+from groundstation.base.sorted_values import median
 from groundstation.integrity.limits import GapLimits
 from groundstation.integrity.rhythm import Rhythm
 
@@ -143,7 +144,8 @@ def _silences(outlines: Sequence[Outline], limits: GapLimits) -> list[tuple[int,
         stopping += stops
         own_ns[stops] = one.longest_ns
     kept = np.flatnonzero((running >= LEAST_TOPICS) & (2 * stopping > running))
-    return [(int(start_ns[row]), int(end_ns[row]), float(np.nanmedian(slack_ns[:, row]))) for row in kept]
+    known_ns = [own_ns[np.isfinite(own_ns)] for own_ns in slack_ns[:, kept].T]
+    return [(int(start_ns[row]), int(end_ns[row]), median(own_ns)) for row, own_ns in zip(kept, known_ns, strict=True)]
 
 
 def _judged(one: Outline, start_ns: Int64Array, end_ns: Int64Array) -> tuple[BoolArray, BoolArray]:

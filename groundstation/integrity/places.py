@@ -15,6 +15,7 @@ import numpy as np
 from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
+from groundstation.integrity import time_passes
 from groundstation.integrity.counting import is_frozen
 from groundstation.integrity.ordering import joined_columns
 from groundstation.integrity.time_passes import MANY_LAID, lay, passes_over
@@ -270,8 +271,9 @@ def _united(pieces: list[BatchPlaces]) -> tuple[Int64Array, Column]:
     if end - start <= 4 * sum(len(piece.index) for piece in pieces):  # places without many holes need no sorting
         seen, time = np.zeros(end - start, dtype=bool), np.zeros(end - start, dtype=np.int64)
         timed = seen if all(piece.time.present is None for piece in pieces) else seen.copy()
+        is_long = sum(len(piece.index) for piece in pieces) >= time_passes.MANY_IN_ALL
         for piece in reversed(pieces):
-            if piece.time.present is None and passes_over(piece.index, piece.time.values, least=MANY_LAID):
+            if is_long and piece.time.present is None and passes_over(piece.index, piece.time.values, least=MANY_LAID):
                 lay(piece.index, piece.time.values, start, seen, timed, time)
                 continue
             at = piece.index - start

@@ -33,7 +33,10 @@ class StepsBySource:
 
 
 def _count(time_ns: Int64Array, sources: Int64Array, last_ns: dict[int, int]) -> int:
-    """Count the steps back of some rows; ``last_ns`` are the last times before, and then theirs."""
+    """Count the steps back of some rows.
+
+    ``last_ns`` are the last times of each source before them, and then theirs.
+    """
     if len(last_ns) < MOST_SOURCES and passes_over(time_ns, sources):
         known, last = np.zeros((2, MOST_SOURCES + 1), dtype=np.int64)
         known[: len(last_ns)], last[: len(last_ns)] = list(last_ns), list(last_ns.values())

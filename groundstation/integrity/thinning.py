@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from groundstation.base.records import BoolArray, Int64Array
+from groundstation.integrity import time_passes
 from groundstation.integrity.time_passes import (
     EARLIEST,
     LATENESS,
@@ -73,7 +74,7 @@ class Thinner:
         starts = starts_of_runs(time, self._tolerance_ns)
         lengths = np.diff(starts, append=len(time))
         ahead = self._ahead(time, starts, lengths)
-        if passes_over(time):
+        if passes_over(time, least=time_passes.MANY_IN_ALL):
             return self._followed(time, starts, ahead)
         steps = np.diff(time)
         self._steps.append(np.unique(steps[steps > 0], return_counts=True))
@@ -85,7 +86,7 @@ class Thinner:
         return kept
 
     def _followed(self, time: Int64Array, starts: Int64Array, ahead: BoolArray) -> BoolArray:
-        """Do the same in one pass."""
+        """Tell it of many records, in one pass."""
         if not len(self._table):
             self._table = np.zeros(TABLE_STEPS, dtype=np.int64)
         kept, rest = np.empty(len(time), dtype=bool), np.empty(len(time), dtype=np.int64)

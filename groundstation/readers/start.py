@@ -10,6 +10,7 @@ import numpy as np
 from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Int64Array, Remark
+from groundstation.base.sorted_values import quantile
 from groundstation.base.timescales import iso_to_utc_ns, leap_seconds_late, whole_weeks
 from groundstation.base.units import NS_PER_S
 
@@ -96,7 +97,7 @@ class ToldZero:
     @property
     def spread_s(self) -> float:
         """Spread in seconds that contains nine tenths of the readings."""
-        return float(np.quantile(np.abs(self.zeros_ns - self.ns), 0.9)) / NS_PER_S
+        return quantile(np.abs(self.zeros_ns - self.ns), 0.9) / NS_PER_S
 
     def remarks(self, clock: str) -> Iterator[Remark]:
         """Yield a remark on each level that does not count; ``clock`` names its source."""

@@ -22,6 +22,7 @@ HEAD = np.dtype(
     ]
 )
 MESSAGE_OPCODE = 5
+WORD, BYTE = np.dtype("<u8"), np.dtype("u1")
 
 
 @dataclass(frozen=True)
@@ -87,12 +88,10 @@ class ChunkMessages:
 
         The records must have an even stride.
         """
-        first = int(self.starts[0])
-        dtype = np.dtype("<u8") if stop - start >= 8 else np.dtype("u1")
+        dtype = WORD if stop - start >= WORD.itemsize else BYTE
         for at in range(start, stop, dtype.itemsize):
-            at = min(at, stop - dtype.itemsize)
-            expected = int.from_bytes(self.buffer[first + at : first + at + dtype.itemsize].tobytes(), "little")
-            if (self.column(dtype, at) != expected).any():
+            words = self.column(dtype, min(at, stop - dtype.itemsize))
+            if (words != words[0]).any():
                 return False
         return True
 

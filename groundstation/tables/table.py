@@ -135,7 +135,10 @@ class Table:
         return texts if column.mask.all() else np.where(column.mask, texts, "")
 
     def take(self, index: Any) -> Self:
-        """The rows that ``index`` (slice, mask or positions) selects; the table itself where a mask selects all."""
+        """The rows that ``index`` (slice, mask or positions) selects.
+
+        A mask that selects all gives the table itself.
+        """
         if isinstance(index, np.ndarray) and index.dtype == bool and len(index) == len(self) and index.all():
             return self
         return replace(

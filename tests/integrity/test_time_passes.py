@@ -52,7 +52,7 @@ def test_a_clock_of_many_records_is_that_of_few(
     monkeypatch.setattr(places, "WINDOW_RECORDS", window_records)
     items: list[Item] = log_of(seed, is_counting=True)
     few = survey(items)
-    monkeypatch.setattr(time_passes, "MANY", 1)
+    monkeypatch.setattr(time_passes, "MANY_IN_ALL", 1)
     monkeypatch.setattr(places, "MANY_LAID", 1)
     many = survey(items)
     for entry in fields(few.clock):
@@ -63,7 +63,7 @@ def test_a_clock_of_many_records_is_that_of_few(
 
 def test_a_period_is_exact_whatever_its_units(monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps of whole microseconds, of none, and longer than the table holds."""
-    monkeypatch.setattr(time_passes, "MANY", 1)
+    monkeypatch.setattr(time_passes, "MANY_IN_ALL", 1)
     for steps in ([1_000, 5_000, 7_000], [1_001, 5_003, 7_000], [90_000_000, 80_000_000, 1_000]):
         time = np.concatenate(([0], np.cumsum(np.tile(steps, 40))))
         batch = RecordBatch("raw.a", np.arange(len(time)), Column(time), {})

@@ -375,6 +375,6 @@ def forecast_driven(
     from groundstation.methods.kalman import runs
 
     built_up = np.zeros((len(growth) // every, *start.shape))
-    growth, mix, known = (frozen(np.ascontiguousarray(part)) for part in (growth, mix, known))
-    runs.run_driven(growth, mix, known, every, np.stack([start, start]), built_up)
+    grown, mixed, before = (frozen(np.ascontiguousarray(part)) for part in (growth, mix, known))
+    runs.run_driven(grown, mixed, before, every, np.stack([start, start]), built_up)
     return built_up

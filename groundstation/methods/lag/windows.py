@@ -87,7 +87,10 @@ class ReferenceSignals:
 
 
 class _Cubic(NamedTuple):
-    """Cubics by share ``u`` of the ``step`` that a time lies in, and their values and slopes over a step."""
+    """Cubics by the share ``u`` of the ``step`` that a time lies in.
+
+    ``left`` is the value at its begin, ``rise`` the slope there over the step, ``over`` and ``bent`` what bends it.
+    """
 
     u: FloatArray
     step: FloatArray

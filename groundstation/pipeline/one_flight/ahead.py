@@ -18,7 +18,7 @@ DRAWING = ("groundstation.viewer.recording", "groundstation.reports.page", "jinj
 
 @contextmanager
 def imported_meanwhile(*, with_pages: bool) -> Iterator[None]:
-    """Import in a second thread what a flight is computed with, and drawn with where ``with_pages`` is set.
+    """Import in a second thread what computes a flight, and what draws it ``with_pages``.
 
     The block ends when all is imported: whoever imports it next finds it whole. A block that fails waits for the module
     at hand alone. What cannot be imported fails where it is needed.

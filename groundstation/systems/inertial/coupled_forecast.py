@@ -125,9 +125,8 @@ def steps_ahead(
 
 
 def coupled_rows(
-    run: CoupledRun,
+    forecast_m: FloatArray,
     separate: Hindcast,
-    settings: InertialSettings,
     *,
     horizons_min: Sequence[float] = FORECAST_HORIZONS_MIN,
     method: str = "last_estimate",
@@ -138,6 +137,8 @@ def coupled_rows(
 
     Parameters
     ----------
+    forecast_m : ndarray, shape (s, l, 2)
+        Of the coupled model, from the starts and at the leads of ``separate``.
     separate : Hindcast
         With ``method``; horizons that are none of its leads are left out, and those without a start.
 
@@ -146,8 +147,7 @@ def coupled_rows(
     tuple of CoupledRow
         ``gain`` is 1 - RMS ratio of the radial error: positive where coupling helps.
     """
-    forecast = hindcast_coupled(run, separate.at, separate.lead_s, settings)
-    coupled = np.sqrt(np.sum(np.square(forecast - separate.actual_m), axis=2))
+    coupled = np.sqrt(np.sum(np.square(forecast_m - separate.actual_m), axis=2))
     apart = separate.radial_m(method)
     rows = []
     for horizon in horizons_min:

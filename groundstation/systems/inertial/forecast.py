@@ -69,7 +69,8 @@ def assess_forecast(
     bank = run_bank(run, settings)
     separate = hindcast(run, plan.at, plan.lead_s, tuple(FORECAST_METHODS), settings, bank)
     since = slice(int(np.searchsorted(separate.start_s, plan.first_start_s - 1e-6)), None)
-    replay = _with_own_variance(_of_model(separate, coupled, settings), coupled, settings)
+    together_m = hindcast_coupled(coupled, plan.at, plan.lead_s, settings)
+    replay = _with_own_variance(separate, together_m, coupled, settings)
     claimed = {method: claimed_sigma(method, run, replay, settings) for method in FORECAST_METHODS}
     skill = skill_rows(replay, claimed, plan.horizons_min, plan.first_start_s)
     best = {
@@ -91,7 +92,7 @@ def assess_forecast(
         phases=_phases(run, coupled, bank, settings, phase_of, judged),
         classic_starts=classic,
         calibration=calibration_rows(replay, claimed, plan.horizons_min, plan.first_start_s),
-        coupled=coupled_rows(coupled, separate.of(since), settings, horizons_min=plan.horizons_min),
+        coupled=coupled_rows(together_m[since], separate.of(since), horizons_min=plan.horizons_min),
         best_method=best,
         figures=(
             figures.map_figure(
@@ -114,12 +115,17 @@ def _of_model(replay: Hindcast, coupled: CoupledRun, settings: InertialSettings)
     return replace(replay, forecast_m=replay.forecast_m | {"last_estimate": forecast})
 
 
-def _with_own_variance(replay: Hindcast, coupled: CoupledRun, settings: InertialSettings) -> Hindcast:
-    """Return the replay with the coupled last estimate's variance, if the settings choose it."""
+def _with_own_variance(
+    replay: Hindcast, together_m: FloatArray, coupled: CoupledRun, settings: InertialSettings
+) -> Hindcast:
+    """Return the replay with the coupled last estimate and its variance, if the settings choose it."""
     if settings.model == "separate":
         return replay
-    own = {"last_estimate": coupled_variance(coupled, replay.at, replay.lead_s)}
-    return replace(replay, variance_m2=replay.variance_m2 | own)
+    forecast, own = (
+        {"last_estimate": together_m},
+        {"last_estimate": coupled_variance(coupled, replay.at, replay.lead_s)},
+    )
+    return replace(replay, forecast_m=replay.forecast_m | forecast, variance_m2=replay.variance_m2 | own)
 
 
 def _lengths_that_fit(plan: ReplayPlan) -> tuple[float, ...]:

@@ -76,10 +76,10 @@ def plan_replay(run: ChannelsRun, settings: InertialSettings) -> ReplayPlan:
     return ReplayPlan(first, step, at, horizons, lead_s, not reason, reason)
 
 
-def _judged(run: ChannelsRun, first_s: float, step_s: float, *horizons_min: float) -> list[int]:
+def _judged(run: ChannelsRun, first_s: float, step_s: float, *horizons_min: float) -> Int64Array:
     """Count the starts that GNSS could judge at some horizons."""
     shown = built_up(run.epochs, start_epochs(run.epochs, first_s, step_s), 60.0 * np.array(horizons_min))
-    return [int(count) for count in np.isfinite(shown).all(axis=2).sum(axis=0)]
+    return np.asarray(np.isfinite(shown).all(axis=2).sum(axis=0))
 
 
 def map_grid(run: ChannelsRun, settings: InertialSettings) -> tuple[Int64Array, FloatArray]:

@@ -28,7 +28,10 @@ LISTED = 3
 
 @dataclass(frozen=True)
 class Resets:
-    """Times of the first sample after each reset of the INS, and the findings on it and on single samples."""
+    """Times of the first sample after each reset of the INS, and findings.
+
+    The findings are on resets and on single samples.
+    """
 
     time_ns: Int64Array
     findings: tuple[Finding, ...]

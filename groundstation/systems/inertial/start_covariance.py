@@ -84,11 +84,8 @@ def _windowed(method: str, run: ChannelsRun, at: Int64Array, channel: int, setti
     for count in np.unique(counts):
         V, younger = _window_factors(method, lags[:count], phi[:count], lengths_s)
         rows = np.flatnonzero(counts == count)
-        own, mixed = (np.zeros((len(rows), SIZE, SIZE)) for _ in range(2))
-        for lag in range(count):
-            D = known[source[rows, lag]]
-            own += V[lag] @ D @ V[lag].T
-            mixed += younger[lag] @ D @ V[lag].T
+        half = known[source[rows, :count]] @ V.transpose(0, 2, 1)  # (rows, lags, 6, 6)
+        own, mixed = (np.sum(part @ half, axis=1) for part in (V, younger))
         out[rows] += own + mixed + np.swapaxes(mixed, 1, 2)
     return out
 

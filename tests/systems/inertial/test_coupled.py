@@ -614,7 +614,8 @@ def test_gain_is_given_against_the_separate_channels_at_the_same_starts() -> Non
     at = start_epochs(differences.epochs, 5400.0, 600.0)
     separate = hindcast(run, at, LEADS_S, ["last_estimate"], SETTINGS)
     ours = coupled.run_coupled(differences, noise, SETTINGS)
-    rows = coupled_forecast.coupled_rows(ours, separate, SETTINGS)
+    forecast = coupled_forecast.hindcast_coupled(ours, separate.at, separate.lead_s, SETTINGS)
+    rows = coupled_forecast.coupled_rows(forecast, separate)
     assert [row.horizon_min for row in rows] == [10.0, 30.0, 60.0, 90.0, 120.0]  # 1 and 5 are no leads of it
     lead = 11
     apart = np.sqrt(np.nanmean(np.square(separate.radial_m("last_estimate")[:, lead])))

@@ -59,7 +59,9 @@ def alone_in(out: Path) -> Iterator[None]:
 
 
 def _locked(path: Path) -> Callable[[], object] | None:
-    """Lock a file as filelock does, and return what takes the lock off; None where another one holds it.
+    """Lock a file as filelock does, and return what takes the lock off.
+
+    It is None where another one holds the lock.
 
     filelock imports asyncio, and has Python called at every file that is opened and every import until the process
     ends: 3 to 7 % of a run. It is used where the system, or the file system, knows no ``flock``.
