@@ -39,7 +39,10 @@ def labels_of(box: Box) -> tuple[Label, ...]:
 
 
 def _beside_lines(box: Box, taken: list[Bounds]) -> Iterator[Label]:
-    """Yield labels above level lines and right of upright ones; of two that would meet the later one moves on."""
+    """Yield labels above level lines and right of upright ones.
+
+    Of two that would meet the later one moves along its line.
+    """
     for mark in box.panel.marks:
         if not isinstance(mark, Limit) or not mark.label:
             continue
@@ -61,7 +64,10 @@ def _beside_lines(box: Box, taken: list[Bounds]) -> Iterator[Label]:
 def _clear(
     left: float, base: float, text: str, taken: list[Bounds], step: tuple[float, float], box: Box
 ) -> tuple[float, float]:
-    """Return left end and base line of a label along its line, in steps, where no other stands; else the first."""
+    """Return left end and base line of a label where no other stands, in steps along its line.
+
+    They are the first ones where there is no such place.
+    """
     tries = [(left + number * step[0], base + number * step[1]) for number in range(MOST_STEPS)]
     inside = [one for one in tries if one[0] >= box.left and one[1] <= box.bottom]
     free = (one for one in inside if not any(_meet(_bounds(*one, width_pt(text)), other) for other in taken))

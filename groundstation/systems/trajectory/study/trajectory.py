@@ -5,12 +5,13 @@ scales a sigma: it is the estimator's equations that are judged.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
 from groundstation.chapters.parts import Section
 from groundstation.results.figures import FigureData
-from groundstation.systems.study import StudyResult, section, table, table_of
+from groundstation.systems.study import StudyResult, mapped, section, table, table_of
 from groundstation.systems.trajectory.study.family import FAMILIES, StudyFamily
 from groundstation.systems.trajectory.study.judged import QUANTITIES, Run, run_of
 
@@ -46,7 +47,8 @@ def study_trajectory(
     """
     rows = []
     for family in families:
-        found = [run_of(family, (seed, number)) for number in range(runs)]
+        with mapped(runs) as each:
+            found = list(each(partial(run_of, family), [(seed, number) for number in range(runs)]))
         rows.append(row_of(family.name, found))
         if progress:
             progress(f"{family.name}: {sum(one is not None for one in found)} of {runs} estimated")
