@@ -7,7 +7,6 @@ import glob
 import os
 import re
 import tempfile
-import zlib
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -41,6 +40,7 @@ from groundstation.base.signals import is_canonical, kind_of
 from groundstation.base.to_disk import sync_folder, sync_open
 from groundstation.base.version import __version__
 from groundstation.store.channel import ChannelWriter, Chunk, Pace, TopicWriter
+from groundstation.store.decompress import crc32
 from groundstation.store.derived import LOG_TOPIC, LocationFixWriter, LogWriter, Origin, PoseWriter
 from groundstation.store.digested import DigestedFile
 from groundstation.store.framing import chunk_head, message_index, to_bytes
@@ -232,7 +232,7 @@ class StoreWriter:
         start, end = int(log_time[0]), int(log_time[-1])
         raw = buffer.data
         data: bytes = self._compressors.own.compress(raw)
-        head = chunk_head(start, end, len(raw), zlib.crc32(raw), len(data))
+        head = chunk_head(start, end, len(raw), crc32(raw), len(data))
         length = len(head) + len(data)
         messages = message_index(chunk.channel_id, log_time, starts)
         index = ChunkIndex(
@@ -269,8 +269,8 @@ class StoreWriter:
         definitions = [channel.definition(self.info.metadata) for channel in self._channels.values() if channel.count]
         schemas: list[McapRecord] = [schema for schema, _ in definitions]
         channels: list[McapRecord] = [channel for _, channel in definitions]
-        checksums = {f"schema {schema.id}": zlib.crc32(to_bytes(schema)) for schema, _ in definitions}
-        checksums |= {f"channel {channel.id}": zlib.crc32(to_bytes(channel)) for _, channel in definitions}
+        checksums = {f"schema {schema.id}": crc32(to_bytes(schema)) for schema, _ in definitions}
+        checksums |= {f"channel {channel.id}": crc32(to_bytes(channel)) for _, channel in definitions}
         strings = self.info.to_strings(checksums)
         facts, copy = (to_bytes(Metadata(name, strings)) for name in (METADATA_NAME, COPY_NAME))
         file.write(MAGIC + to_bytes(Header(profile="", library=LIBRARY)))
@@ -375,5 +375,5 @@ def _summary(groups: list[tuple[Opcode, list[McapRecord]]], start: int) -> bytes
     offset_start = start + len(body)
     body += to_bytes(*offsets)
     footer = to_bytes(Footer(summary_start=start, summary_offset_start=offset_start, summary_crc=0))
-    crc = zlib.crc32(footer[:-4], zlib.crc32(body))
+    crc = crc32(footer[:-4], crc32(body))
     return body + footer[:-4] + crc.to_bytes(4, "little")
