@@ -1,10 +1,11 @@
 """Ways that were weighed for speed and not taken, each beside the way that was.
 
 A preloaded server of workers beside spawned ones; Arrow IPC between the stages of a run beside the MCAP; numba's
-parallel loops beside serial ones; parts of numpy that a conversion loads; another interpreter, named by
-``OTHER_PYTHON`` (with the package installed), beside this one.
+parallel loops beside serial ones; the standard library's dataclasses beside ours; parts of numpy that a conversion
+loads; another interpreter, named by ``OTHER_PYTHON`` (with the package installed), beside this one.
 """
 
+import dataclasses
 import multiprocessing
 import os
 import re
@@ -25,6 +26,7 @@ from benchmarks.bench_memory import flight_csv
 from benchmarks.bench_verbs import LOGS_OF
 from benchmarks.record import ROUNDS, Book, by_turns
 from benchmarks.recorded import are_here
+from groundstation.base.dataclasses import dataclass as lazy_dataclass
 from groundstation.base.records import RecordBatch
 from groundstation.pipeline.many_flights.processes.workers import TASKS_PER_PROCESS
 from groundstation.pipeline.verbs.provenance import CHECKOUT
@@ -36,7 +38,7 @@ COMMAND = ["-m", "groundstation"]
 SMALL = CHECKOUT / "sample_logs" / "taxi-good.csv"
 # What a server may hold before it forks: no numba, no Arrow, no Rerun, whose threads a fork would freeze.
 PRELOADED = ["numpy", "groundstation.pipeline.one_flight.job", "groundstation.pipeline.one_flight.convert"]
-FEW_ROUNDS, HOUR_ROWS, DRAWS, EPOCHS = 3, 360_000, 40, 100_000
+FEW_ROUNDS, HOUR_ROWS, DRAWS, EPOCHS, CLASSES = 3, 360_000, 40, 100_000, 500
 ONE_IMPORT = re.compile(r"import time:\s+(\d+) \|\s+\d+ \|\s+(\S+)")
 
 
@@ -145,6 +147,33 @@ def parallel_loops(book: Book) -> None:
     book.against(what, times["several threads"], times["one thread"], "one thread")
 
 
+def classes(book: Book) -> None:
+    """Record what a dataclass costs that is defined and never used, and one that is used once."""
+    makers = {"ours": lazy_dataclass, "standard": dataclasses.dataclass}
+    for what, use in (("never used", False), ("used once", True)):
+        times = by_turns({name: partial(defined, make, use=use) for name, make in makers.items()})
+        told = f"{CLASSES} dataclasses of five fields, {what}"
+        book.against(told, times["ours"], times["standard"], "dataclasses", is_times=True)
+
+
+def defined(make: Callable[..., Callable[[type], type]], *, use: bool) -> None:
+    """Define classes, and make an instance of each where they are used."""
+    for _ in range(CLASSES):
+
+        class Row:
+            """A row."""
+
+            a: int
+            b: float = 1.0
+            c: str = ""
+            d: tuple[int, ...] = ()
+            e: list[int] = dataclasses.field(default_factory=list)
+
+        made = make(frozen=True)(Row)
+        if use:
+            made(1)
+
+
 def numpy_parts(book: Book, folder: Path) -> None:
     """Record what a conversion imports of numpy beyond what ``import numpy`` does."""
     verb = [*COMMAND, "convert", str(SMALL), "-q", "--force", "-o", str(folder / "x.mcap")]
@@ -192,6 +221,7 @@ def main() -> None:
         workers(book)
         stages_by_arrow(book, Path(folder))
         parallel_loops(book)
+        classes(book)
         numpy_parts(book, Path(folder))
         other_interpreter(book, Path(folder))
 
