@@ -37,7 +37,6 @@ from groundstation.readers.rows import RowBlock, RowScanner
 from groundstation.readers.sections import TableSection
 from groundstation.readers.source import Source
 
-LARGE_BYTES = 1 << 20  # of a block whose columns become numbers on all cores
 MAX_BATCH_BYTES = 32 << 20  # a text field is as wide as its longest value: a batch of long texts has fewer rows
 
 
@@ -146,9 +145,7 @@ class TableReader:
         names = [str(column) for column in range(self._dialect.cells)]
         table = pa_csv.read_csv(
             pa.BufferReader(block.text),
-            read_options=pa_csv.ReadOptions(
-                column_names=names, use_threads=len(block.text) >= LARGE_BYTES, block_size=len(block.text) + 1
-            ),
+            read_options=pa_csv.ReadOptions(column_names=names, use_threads=False, block_size=len(block.text) + 1),
             parse_options=pa_csv.ParseOptions(
                 delimiter=self._dialect.delimiter, quote_char=False, escape_char=False, ignore_empty_lines=False
             ),

@@ -373,24 +373,3 @@ def test_a_column_that_is_nearly_canonical_is_told_with_the_one_meant(tmp_path: 
     (tmp_path / "a.csv").write_text("time_s,ins.roll,gnss.gdop\n0,1,2\n1,1,2\n2,1,2\n", encoding="utf-8")
     (remark,) = [item for item in registry.read(tmp_path / "a.csv") if isinstance(item, Remark)]
     assert remark.text.endswith("kept as raw: ins.roll (ins.roll_deg?)")
-
-
-def test_blocks_on_all_cores_give_the_numbers_of_blocks_on_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    log = Path(__file__).parents[2] / "sample_logs" / "taxi-good.csv"
-    options, on_threads = table_reader.pa_csv.ReadOptions, list[bool]()
-
-    def noted(**given: Any) -> Any:
-        on_threads.append(given["use_threads"])
-        return options(**given)
-
-    monkeypatch.setattr(table_reader.pa_csv, "ReadOptions", noted)
-    found = []
-    for large_bytes in (1 << 30, 0):
-        monkeypatch.setattr(table_reader, "LARGE_BYTES", large_bytes)
-        found.append(Read(log).batches)
-    assert set(on_threads) == {False, True} and len(found[0]) == len(found[1])
-    for one, other in zip(*found, strict=True):
-        assert np.array_equal(one.device_time_ns.values, other.device_time_ns.values)
-        for name, column in one.columns.items():
-            assert column.values.tobytes() == other.columns[name].values.tobytes()
-            assert np.array_equal(column.mask, other.columns[name].mask)
