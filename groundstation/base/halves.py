@@ -5,16 +5,15 @@ from collections.abc import Callable
 from threading import Thread
 
 
-def has_two_cores() -> bool:
-    """Tell whether this process may use two cores or more.
+def cores() -> int:
+    """Return the number of cores that this process may use.
 
     Examples
     --------
-    >>> has_two_cores() in (True, False)
+    >>> cores() >= 1
     True
     """
-    allowed = getattr(os, "sched_getaffinity", None)
-    return (len(allowed(0)) if allowed else os.cpu_count() or 1) > 1
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def both(first: Callable[[], object], second: Callable[[], object]) -> None:

@@ -1,7 +1,7 @@
 """One pass over a log: its header, clock model and ledger.
 
 Kept are places and times, 16 bytes a record, for each set of topics that are sampled together; when there are more than
-64 MiB of them, all go to a temporary file, 12 bytes a record; times of validity take 8 bytes more. Rates and gaps are
+16 MiB of them, all go to a temporary file, 12 bytes a record; times of validity take 8 bytes more. Rates and gaps are
 those of the times at which values were valid.
 """
 

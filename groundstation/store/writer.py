@@ -50,7 +50,7 @@ from groundstation.store.marks import MAGIC, METADATA_NAME, PACKAGE
 LIBRARY, MCAP_VERSION = f"groundstation {__version__}", mcap.__version__
 # Higher levels save 4 to 7 % of recorded flights and read random mantissas a quarter slower: docs/decisions/007.
 ZSTD_LEVEL = -1
-MEMORY_BYTES = 1  # finished chunks kept in memory; when there are more, the oldest go to the spool
+MEMORY_BYTES = 1 << 20  # finished chunks kept in memory; when there are more, the oldest go to the spool
 COMPRESSING = min(2, os.cpu_count() or 1)  # threads that compress; the one that encodes waits for them when it is ahead
 MOST_ON_THEIR_WAY = 4  # chunks that wait for those threads
 PART = ".part"  # end of the name of a file that is being written

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_360
 from groundstation.base.dataclasses import dataclass
-from groundstation.base.halves import both, has_two_cores
+from groundstation.base.halves import both, cores
 from groundstation.base.units import ARCMIN_PER_DEG, DEG_PER_RAD
 from groundstation.methods.taxi_error import noise
 from groundstation.methods.taxi_error.posterior import ErrorPosterior, even_draws
@@ -174,7 +174,7 @@ class _Target:
             noise.evaluate(thetas[part], self.still, self.taxi, self.prior, checkpoints, *out, room)
 
         rounds = -(-count // noise.LANES)
-        if rounds > 1 and has_two_cores():
+        if rounds > 1 and cores() > 1:
             half = -(-rounds // 2) * noise.LANES
             other = noise.room_for(self.width, len(checkpoints))
             both(partial(fill, slice(half), room), partial(fill, slice(half, count), other))

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from groundstation.base.dataclasses import dataclass
+from groundstation.base.halves import cores
 from groundstation.base.version import __version__
 
 CHECKOUT = Path(__file__).resolve().parents[3]
@@ -31,8 +32,7 @@ class Machine:
 
 def this_machine() -> Machine:
     """Return the machine this process runs on."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return Machine(_cpu_model(), cores, round(_memory_bytes() / BYTES_PER_GB, 1), platform.python_version())
+    return Machine(_cpu_model(), cores(), round(_memory_bytes() / BYTES_PER_GB, 1), platform.python_version())
 
 
 def commit_of(folder: Path = CHECKOUT) -> str:

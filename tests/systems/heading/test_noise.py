@@ -95,7 +95,7 @@ def test_draws_on_two_cores_are_judged_as_on_one(count: int, monkeypatch: pytest
     found, threads, evaluate = [], set[str](), noise.evaluate
     monkeypatch.setattr(noise, "evaluate", lambda *a: threads.add(current_thread().name) or evaluate(*a))
     for has_two in (False, True):
-        monkeypatch.setattr(interval, "has_two_cores", partial(bool, has_two))
+        monkeypatch.setattr(interval, "cores", partial(int, 1 + has_two))
         found.append(_Target(NO_STANDSTILL, data).evaluate(thetas, np.array([20, 60])))
     assert ("half" in threads) == (count > noise.LANES)
     for one, other in zip(*found, strict=True):

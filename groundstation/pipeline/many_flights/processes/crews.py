@@ -1,7 +1,6 @@
 """Crew of a run: a cluster, processes side by side or each apart, or this process alone."""
 
 import math
-import os
 from functools import partial
 
 from groundstation.pipeline.many_flights.processes.apart import outcomes_apart
@@ -38,11 +37,3 @@ def crew_for(
     return partial(
         side_by_side, workers=min(workers, logs), listen=listen, timeout_s=timeout_s, tasks_per_process=tasks
     )
-
-
-def cores() -> int:
-    """Return the number of processes that run at once by default.
-
-    It is the number of cores that this process may use.
-    """
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

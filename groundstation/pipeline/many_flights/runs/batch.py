@@ -14,6 +14,7 @@ from pathlib import Path, PurePath
 from types import MappingProxyType
 
 from groundstation.base.errors import UsageError
+from groundstation.base.halves import cores
 from groundstation.base.to_disk import sync_folder
 from groundstation.pipeline.many_flights.fleet.delta_sink import delta_place, put_flights
 from groundstation.pipeline.many_flights.fleet.index import write_index_of
@@ -24,7 +25,7 @@ from groundstation.pipeline.many_flights.fleet.scan import Scan
 from groundstation.pipeline.many_flights.inputs import is_remote, session_folders
 from groundstation.pipeline.many_flights.processes.apart import bounds_of
 from groundstation.pipeline.many_flights.processes.crew import AnyJob, Crew, in_turn
-from groundstation.pipeline.many_flights.processes.crews import cores, crew_for
+from groundstation.pipeline.many_flights.processes.crews import crew_for
 from groundstation.pipeline.many_flights.processes.workers import TASKS_PER_PROCESS
 from groundstation.pipeline.many_flights.remote.jobs import RemoteJob, digest_remote, run_remote
 from groundstation.pipeline.many_flights.remote.output import RemoteOutput
