@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.least import chunks_of, write_the_least
 from benchmarks.record import ROUNDS, Book, Goal, Times, by_turns
 from benchmarks.recorded import LOGS, are_here
 from groundstation.integrity.clock import ClockModel
@@ -100,6 +101,12 @@ def surveyed(path: Path) -> None:
         pass
 
 
+def least_convert(path: Path, chunks: list[bytes], target: Path) -> None:
+    """Do what convert does before it writes, then what no writer can leave out."""
+    surveyed(path)
+    write_the_least(chunks, target)
+
+
 def by_pymavlink(path: Path, values: bool) -> int:
     """Take every message of a log; with its ``values``, or without a look at them."""
     from pymavlink.DFReader import DFReader_binary
@@ -144,6 +151,8 @@ def report(book: Book, path: Path, folder: Path, rounds: int) -> None:
     """Record the figures of one log."""
     target, broken = folder / "x.mcap", folder / "broken.BIN"
     damaged(path, broken)
+    convert_log(open_log(path), target)
+    chunks = chunks_of(target)
     works: dict[str, Callable[[], object]] = {
         "read": lambda: list(read(Source(path))),
         "tables alone": lambda: to_tables(path, is_surveyed=False),
@@ -152,6 +161,7 @@ def report(book: Book, path: Path, folder: Path, rounds: int) -> None:
         "broken": lambda: to_tables(broken),
         "least": lambda: least_work(path),
         "surveyed": lambda: surveyed(path),
+        "least convert": lambda: least_convert(path, chunks, broken.with_name("least.mcap")),
     }
     repeats = dict.fromkeys(works, REPEATS)
     has_peer = book.has("pymavlink")
@@ -176,10 +186,11 @@ def beside_pymavlink(book: Book, log: str, times: dict[str, Times]) -> None:
         ("convert", "to MCAP", CONVERT_GOAL),
         ("least", "limit: records found, fields copied and gone over once", None),
         ("surveyed", "limit: read, ledger made, nothing written", None),
+        ("least convert", "limit: read, ledger made, then the least of writing", None),
     ):
         for peer, told, limit in (("bare", "recv_msg", goal), ("values", "recv_msg with its values", None)):
             given = {"goal": limit, "is_times": True, "distribution": "pymavlink"}
-            if peer == "values" and work in ("least", "surveyed"):
+            if peer == "values" and work in ("least", "surveyed", "least convert"):
                 continue
             book.against(f"{log} {what}", times[work], times[peer], f"pymavlink {told}", **given)
 

@@ -4,22 +4,19 @@ A topic of ten double fields, random walks (whose last digits do not compress), 
 """
 
 import argparse
-import hashlib
-import os
 import tempfile
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import zstandard
 from mcap.reader import make_reader
-from mcap.records import Chunk
-from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
+from benchmarks.least import chunks_of, compress, write_the_least
 from benchmarks.record import ROUNDS, Book, Goal, Times, by_turns
 from groundstation.base.records import Column, RecordBatch
+from groundstation.store.decompress import crc32
 from groundstation.store.info import StoreInfo
 from groundstation.store.reader import read
 from groundstation.store.schema import canonical_type
@@ -104,42 +101,11 @@ def write_peer(path: Path, batches: list[RecordBatch]) -> None:
         writer.finish()
 
 
-def chunks_of(path: Path) -> list[bytes]:
-    """What stands in the chunks of a file, decompressed: all that zstd has to do when it is written."""
-    with path.open("rb") as file:
-        chunks = [record for record in StreamReader(file, emit_chunks=True).records if isinstance(record, Chunk)]
-    return [zstandard.ZstdDecompressor().decompress(one.data, one.uncompressed_size) for one in chunks]
-
-
-def compress(chunks: list[bytes], level: int = ZSTD_LEVEL, threads: int = 0) -> int:
-    """Compress chunks one after the other, and nothing else; return the bytes of what comes out."""
-    compressor = zstandard.ZstdCompressor(level=level, threads=threads)
-    return sum(len(compressor.compress(one)) for one in chunks)
-
-
-def write_the_least(chunks: list[bytes], path: Path) -> None:
-    """Do what no writer of such a file can leave out.
-
-    Each byte copied once, its checksum, zstd, the digest of the file, the file on the disk.
-    """
-    room = memoryview(bytearray(max(map(len, chunks))))
-    compressor, digest = zstandard.ZstdCompressor(level=ZSTD_LEVEL), hashlib.sha256()
-    with path.open("wb") as file:
-        for one in chunks:
-            room[: len(one)] = one
-            data = compressor.compress(room[: len(one)])
-            zlib.crc32(room[: len(one)])
-            digest.update(data)
-            file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-
-
 def read_the_least(packed: list[tuple[bytes, int]], rows: int) -> None:
     """Decompress chunks, check them, and copy as many bytes as the tables have."""
     decompressor = zstandard.ZstdDecompressor()
     for data, size in packed:
-        zlib.crc32(decompressor.decompress(data, size))
+        crc32(decompressor.decompress(data, size))
     for _ in range(len(FIELDS) + 3):
         np.ones(rows).copy()
 

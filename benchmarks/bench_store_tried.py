@@ -12,7 +12,8 @@ import numba
 import numpy as np
 import zstandard
 
-from benchmarks.bench_store import batches_of, chunks_of, compress, write_store
+from benchmarks.bench_store import batches_of, write_store
+from benchmarks.least import chunks_of, compress
 from benchmarks.record import ROUNDS, Book, by_turns
 from groundstation.base.records import RecordBatch
 from groundstation.store import writer

@@ -10,10 +10,12 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.least import chunks_of, write_the_least
 from benchmarks.record import ROUNDS, Book, Goal, by_turns
 from benchmarks.recorded import LOGS, are_here
 from groundstation.base.records import Column, RecordBatch
@@ -45,6 +47,15 @@ def surveyed(path: Path) -> None:
     items = list(registry.read(path))
     for _batch in corrected(items, survey(items).clock):
         pass
+
+
+def least(path: Path, chunks: list[bytes], target: Path) -> None:
+    """Do what convert does before it writes, then what no writer can leave out, on two cores.
+
+    The first must be over before the second begins: the time in a message is that of a clock which the whole log tells.
+    """
+    surveyed(path)
+    write_the_least(chunks, target, threads=2)
 
 
 def _joined(name: str, batches: list[RecordBatch]) -> Column:
@@ -117,6 +128,8 @@ def measure(book: Book, paths: dict[str, Path], target: Path) -> None:
         works[f"{name} tables"] = lambda path=path: tables_of(path)  # type: ignore[misc]
         works[f"{name} convert"] = lambda path=path: convert_log(open_log(path), target)  # type: ignore[misc]
         works[f"{name} surveyed"] = lambda path=path: surveyed(path)  # type: ignore[misc]
+        convert_log(open_log(path), target)
+        works[f"{name} least"] = partial(least, path, chunks_of(target), target.with_name("least"))
         if has_peer:
             from pyulog import ULog
 
@@ -132,8 +145,9 @@ def measure(book: Book, paths: dict[str, Path], target: Path) -> None:
             book.against(convert, times[f"{name} convert"], peer, "pyulog", note="two threads, both counted")
             by_clock = {"goal": CONVERT_GOAL, "by_clock": True}
             book.against(f"{convert}, by the clock", times[f"{name} convert"], peer, "pyulog", **by_clock)
-            limit = f"ULog of {size} limit: read, ledger made, nothing written, by the clock"
-            book.against(limit, times[f"{name} surveyed"], peer, "pyulog", by_clock=True)
+            for work, what in (("surveyed", "nothing written"), ("least", "then the least of writing on two cores")):
+                limit = f"ULog of {size} limit: read, ledger made, {what}, by the clock"
+                book.against(limit, times[f"{name} {work}"], peer, "pyulog", by_clock=True)
         memory(book, paths[name], size, has_peer=has_peer)
     what = f"ULog damaged every {DAMAGE_EVERY} bytes to tables"
     book.against(what, times["damaged tables"], times["whole tables"], "the good log", goal=DAMAGED_GOAL)

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks.bench_memory import flight_csv
-from benchmarks.bench_store import chunks_of, compress
+from benchmarks.least import chunks_of, compress
 from benchmarks.record import ROUNDS, Book, by_turns
 from benchmarks.recorded import LOGS, are_here
 from groundstation.pipeline.verbs.provenance import CHECKOUT
