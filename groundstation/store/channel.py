@@ -30,7 +30,7 @@ DERIVED_KEY = "derived_from"  # in the metadata of a channel made from another o
 class Chunk:
     """Message records of one channel, ready to be compressed.
 
-    Bytes, times and places of the messages, in pieces.
+    Bytes, times and places of the messages, in pieces; ``nbytes`` are those of all messages.
     """
 
     channel_id: int
@@ -38,6 +38,7 @@ class Chunk:
     buffers: Sequence[ByteArray]
     log_times: Sequence[Int64Array]
     starts: Sequence[Int64Array]
+    nbytes: int
 
 
 class Pace:
@@ -136,7 +137,7 @@ class ChannelWriter:
         """Emit what is gathered as a chunk."""
         if not self._bytes:
             return
-        chunk = Chunk(self.id, self.topic, self._buffers, self._times, self._starts)
+        chunk = Chunk(self.id, self.topic, self._buffers, self._times, self._starts, self._bytes)
         self.pace.count(self._bytes)
         self._buffers, self._times, self._starts, self._bytes = [], [], [], 0
         self._emit(chunk)

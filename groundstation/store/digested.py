@@ -32,7 +32,7 @@ class DigestedFile:
     def __init__(self, file: BinaryIO, threads: Executor) -> None:
         self._file, self._threads, self._at = file, threads, 0
         self._digest = hashlib.sha256()
-        self._parts: list[bytes] = []
+        self._parts: list[bytes | memoryview] = []
         self._waiting = 0  # bytes of them
         self._before: Future[None] | None = None
 
@@ -47,7 +47,7 @@ class DigestedFile:
         """Bytes written."""
         return self._at
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes | memoryview) -> None:
         """Write bytes at the end."""
         self._file.write(data)
         self._at += len(data)
@@ -71,6 +71,6 @@ class DigestedFile:
         if self._before is not None:
             self._before.result()
 
-    def _update(self, parts: Sequence[bytes]) -> None:
+    def _update(self, parts: Sequence[bytes | memoryview]) -> None:
         for part in parts:
             self._digest.update(part)

@@ -6,7 +6,6 @@ Chunks go to a spool as they fill, and into the file in order of time when all a
 import glob
 import os
 import re
-import tempfile
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -14,14 +13,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import local
 from types import TracebackType
-from typing import Any, BinaryIO, Self
+from typing import Any, NamedTuple, Self
 
 import mcap
 import numpy as np
 import zstandard
 from mcap.opcode import Opcode
 from mcap.records import (
-    ChunkIndex,
     DataEnd,
     Footer,
     Header,
@@ -33,7 +31,6 @@ from mcap.records import (
 )
 from numpy.typing import NDArray
 
-from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import RecordBatch
 from groundstation.base.signals import is_canonical, kind_of
@@ -43,39 +40,42 @@ from groundstation.store.channel import ChannelWriter, Chunk, Pace, TopicWriter
 from groundstation.store.decompress import crc32
 from groundstation.store.derived import LOG_TOPIC, LocationFixWriter, LogWriter, Origin, PoseWriter
 from groundstation.store.digested import DigestedFile
-from groundstation.store.framing import chunk_head, message_index, to_bytes
+from groundstation.store.framing import ChunkPlace, chunk_head, chunk_indexes, message_index, to_bytes
 from groundstation.store.info import COPY_NAME, StoreInfo
 from groundstation.store.marks import MAGIC, METADATA_NAME, PACKAGE
+from groundstation.store.spool import Kept, Spool
 
 LIBRARY, MCAP_VERSION = f"groundstation {__version__}", mcap.__version__
 # Higher levels save 4 to 7 % of recorded flights and read random mantissas a quarter slower: docs/decisions/007.
 ZSTD_LEVEL = -1
-MEMORY_BYTES = 1 << 20  # finished chunks kept in memory; when there are more, the oldest go to the spool
 COMPRESSING = min(2, os.cpu_count() or 1)  # threads that compress; the one that encodes waits for them when it is ahead
-MOST_ON_THEIR_WAY = 4  # chunks that wait for those threads
+AT_ONCE_BYTES = 256 << 10  # chunks of so many bytes are handed to a thread together
+MOST_ON_THEIR_WAY = 4  # such groups that wait for those threads
 PART = ".part"  # end of the name of a file that is being written
 MAX_CHANNELS = 65_535  # MCAP's channel ids have 16 bits
 
 
-@dataclass
-class _Finished:
-    """Chunk and its message index, in memory or in the spool.
+class _Packed(NamedTuple):
+    """Compressed chunk of a topic and its message index, as they are written."""
 
-    It stands at a place of the spool where there are no ``parts``.
-    """
-
-    parts: tuple[bytes, ...]
-    place: int
-    nbytes: int
     topic: str
-    index: ChunkIndex
+    place: ChunkPlace
+    parts: tuple[bytes, ...]
+
+
+class _Kept(NamedTuple):
+    """Compressed chunk of a topic in the spool."""
+
+    topic: str
+    place: ChunkPlace
+    kept: Kept
 
 
 class StoreWriter:
     """Writer of batches of corrected records into an MCAP file.
 
     The file appears under its name when the ``with`` block ends without an exception; until then its chunks are in
-    memory, or, beyond ``MEMORY_BYTES``, in an unnamed temporary file of the same folder. Chunks stand in order of their
+    memory, or, when there are many, in an unnamed temporary file of the same folder. Chunks stand in order of their
     first log time whatever the order in which topics were written; equal input gives equal bytes. Threads compress
     chunks while the next ones are encoded.
 
@@ -109,15 +109,16 @@ class StoreWriter:
         self._pace = Pace()
         self._names: set[str] = set()
         self._compressors = local()  # one for each thread
-        self._chunks: list[_Finished] = []
-        self._bytes = self._spooled = 0  # bytes of those in memory; how many are in the spool
-        self._spool: BinaryIO | None = None
+        self._chunks: list[_Kept] = []
+        self._spool: Spool | None = None
         self._threads = ThreadPoolExecutor(COMPRESSING, "store")
-        self._on_their_way: deque[Future[_Finished]] = deque()
+        self._gathered: list[Chunk] = []
+        self._bytes = 0  # of those
+        self._on_their_way: deque[Future[list[_Packed]]] = deque()
 
     def __enter__(self) -> Self:
         with self._failing_in_one_line():
-            self._spool = tempfile.TemporaryFile(dir=self.path.parent)
+            self._spool = Spool(self.path.parent)
         return self
 
     def __exit__(
@@ -131,6 +132,7 @@ class StoreWriter:
                     for channel in self._channels.values():
                         channel.flush()
                     self._write_log()
+                    self._send()
                     self._wait_until_left(0)
                     with part.open("wb") as file:
                         told = DigestedFile(file, self._threads)
@@ -191,8 +193,9 @@ class StoreWriter:
 
     def _write_log(self) -> None:
         """Write findings and events as one channel, behind all others."""
+        self._send()
         self._wait_until_left(0)
-        ends = [(chunk.index.message_start_time, chunk.index.message_end_time) for chunk in self._chunks]
+        ends = [(chunk.place.start_ns, chunk.place.end_ns) for chunk in self._chunks]
         if ends:
             first_ns, last_ns = min(start for start, _ in ends), max(end for _, end in ends)
             self._log.finish(len(self._channels) + 1, self.info.findings, first_ns, last_ns)
@@ -212,57 +215,33 @@ class StoreWriter:
         return name
 
     def _hand_over(self, chunk: Chunk) -> None:
-        """Let a thread compress a chunk.
+        """Take in a chunk; a thread compresses it together with others, as each handing over takes time.
 
         Waits while too many are on their way, and raises what went wrong with those.
         """
-        self._on_their_way.append(self._threads.submit(self._compressed, chunk))
+        self._gathered.append(chunk)
+        self._bytes += chunk.nbytes
+        if self._bytes >= AT_ONCE_BYTES:
+            self._send()
+
+    def _send(self) -> None:
+        """Let a thread compress what is gathered."""
+        self._on_their_way.append(self._threads.submit(self._compressed, self._gathered))
+        self._gathered, self._bytes = [], 0
         self._wait_until_left(MOST_ON_THEIR_WAY)
 
     def _wait_until_left(self, count: int) -> None:
         """Keep the compressed chunks, in the order in which they were handed over."""
+        assert self._spool is not None
         while len(self._on_their_way) > count:
-            self._keep(self._on_their_way.popleft().result())
+            for chunk in self._on_their_way.popleft().result():
+                self._chunks.append(_Kept(chunk.topic, chunk.place, self._spool.put(chunk.parts)))
 
-    def _compressed(self, chunk: Chunk) -> _Finished:
-        """Compress a chunk; in one of the threads."""
+    def _compressed(self, chunks: Sequence[Chunk]) -> list[_Packed]:
+        """Compress chunks; in one of the threads."""
         if not hasattr(self._compressors, "own"):
             self._compressors.own = zstandard.ZstdCompressor(level=ZSTD_LEVEL)
-        buffer, log_time, starts = (_joined(parts) for parts in (chunk.buffers, chunk.log_times, chunk.starts))
-        start, end = int(log_time[0]), int(log_time[-1])
-        raw = buffer.data
-        data: bytes = self._compressors.own.compress(raw)
-        head = chunk_head(start, end, len(raw), crc32(raw), len(data))
-        length = len(head) + len(data)
-        messages = message_index(chunk.channel_id, log_time, starts)
-        index = ChunkIndex(
-            chunk_start_offset=0,  # known when all chunks are
-            chunk_length=length,
-            message_start_time=start,
-            message_end_time=end,
-            message_index_offsets={chunk.channel_id: length},
-            message_index_length=len(messages),
-            compression="zstd",
-            compressed_size=len(data),
-            uncompressed_size=len(raw),
-        )
-        return _Finished((head, data, messages), 0, length + len(messages), chunk.topic, index)
-
-    def _keep(self, chunk: _Finished) -> None:
-        """Keep a compressed chunk in memory.
-
-        The oldest go to the spool when there are more bytes than memory for.
-        """
-        assert self._spool is not None
-        self._chunks.append(chunk)
-        self._bytes += chunk.nbytes
-        while self._bytes > MEMORY_BYTES:
-            oldest = self._chunks[self._spooled]
-            oldest.place = self._spool.tell()
-            self._spool.writelines(oldest.parts)
-            oldest.parts = ()
-            self._bytes -= oldest.nbytes
-            self._spooled += 1
+        return [_packed(chunk, self._compressors.own) for chunk in chunks]
 
     def _finish(self, file: DigestedFile) -> None:
         """Write the whole file: definitions, chunks, facts again, summary."""
@@ -278,50 +257,36 @@ class StoreWriter:
         file.write(facts + to_bytes(*schemas, *channels))
         again = {channel.id: to_bytes(schema, channel) for schema, channel in definitions}
         count = Counter[int]()
-        indexes = []
+        assert self._spool is not None
+        written: list[ChunkPlace] = []
         for chunk in sorted(self._chunks, key=_order):
-            (channel_id,) = chunk.index.message_index_offsets
-            indexes.append(self._copy_chunk(file, chunk))
+            written.append(chunk.place._replace(at=file.tell()))
+            file.write(self._spool.get(chunk.kept))
+            channel_id = chunk.place.channel_id
             count[channel_id] += 1
             if count[channel_id].bit_count() == 1:  # after chunks 1, 2, 4, 8 ..., in case those at both ends are lost
                 file.write(again[channel_id])
         places.append(MetadataIndex(offset=file.tell(), length=len(copy), name=COPY_NAME))
         file.write(copy + to_bytes(DataEnd(0)))
-        groups: list[tuple[Opcode, list[McapRecord]]] = [
-            (Opcode.SCHEMA, schemas),
-            (Opcode.CHANNEL, channels),
-            (Opcode.STATISTICS, [self._statistics(len(schemas), indexes)]),
-            (Opcode.CHUNK_INDEX, list(indexes)),
-            (Opcode.METADATA_INDEX, list(places)),
+        groups = [
+            (Opcode.SCHEMA, to_bytes(*schemas)),
+            (Opcode.CHANNEL, to_bytes(*channels)),
+            (Opcode.STATISTICS, to_bytes(self._statistics(len(schemas), written))),
+            (Opcode.CHUNK_INDEX, chunk_indexes(written)),
+            (Opcode.METADATA_INDEX, to_bytes(*places)),
         ]
         file.write(_summary(groups, file.tell()) + MAGIC)
 
-    def _copy_chunk(self, file: DigestedFile, chunk: _Finished) -> ChunkIndex:
-        """Copy a chunk from the spool; return its index with its new places."""
-        assert self._spool is not None
-        start = file.tell()
-        if chunk.parts:
-            file.writelines(chunk.parts)
-            chunk.parts = ()
-        else:
-            self._spool.seek(chunk.place)
-            file.write(self._spool.read(chunk.nbytes))
-        chunk.index.chunk_start_offset = start
-        chunk.index.message_index_offsets = {
-            channel_id: start + offset for channel_id, offset in chunk.index.message_index_offsets.items()
-        }
-        return chunk.index
-
-    def _statistics(self, schema_count: int, indexes: list[ChunkIndex]) -> Statistics:
+    def _statistics(self, schema_count: int, written: Sequence[ChunkPlace]) -> Statistics:
         counts = {channel.id: channel.count for channel in self._channels.values() if channel.count}
         return Statistics(
             attachment_count=0,
             channel_count=len(counts),
             channel_message_counts=counts,
-            chunk_count=len(indexes),
+            chunk_count=len(written),
             message_count=sum(counts.values()),
-            message_start_time=min((index.message_start_time for index in indexes), default=0),
-            message_end_time=max((index.message_end_time for index in indexes), default=0),
+            message_start_time=min((chunk.start_ns for chunk in written), default=0),
+            message_end_time=max((chunk.end_ns for chunk in written), default=0),
             metadata_count=2,
             schema_count=schema_count,
         )
@@ -355,20 +320,31 @@ def _is_alive(process: int) -> bool:
     return True
 
 
+def _packed(chunk: Chunk, compressor: zstandard.ZstdCompressor) -> _Packed:
+    """Return a chunk compressed, with its message index."""
+    buffer, log_time, starts = (_joined(parts) for parts in (chunk.buffers, chunk.log_times, chunk.starts))
+    start, end = int(log_time[0]), int(log_time[-1])
+    raw = buffer.data
+    data: bytes = compressor.compress(raw)
+    head = chunk_head(start, end, len(raw), crc32(raw), len(data))
+    messages = message_index(chunk.channel_id, log_time, starts)
+    sizes = len(head) + len(data), len(messages), len(data), len(raw)
+    return _Packed(chunk.topic, ChunkPlace(chunk.channel_id, start, end, *sizes), (head, data, messages))
+
+
 def _joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
-def _order(chunk: _Finished) -> tuple[int, str]:
+def _order(chunk: _Kept) -> tuple[int, str]:
     """Sort chunks by first log time, then by topic; others stay as they came."""
-    return chunk.index.message_start_time, chunk.topic
+    return chunk.place.start_ns, chunk.topic
 
 
-def _summary(groups: list[tuple[Opcode, list[McapRecord]]], start: int) -> bytes:
+def _summary(groups: Sequence[tuple[Opcode, bytes]], start: int) -> bytes:
     """Return the summary section with its offsets and the footer, which has the checksum."""
     body, offsets = b"", []
-    for opcode, records in groups:
-        data = to_bytes(*records)
+    for opcode, data in groups:
         if data:
             offsets.append(SummaryOffset(group_opcode=opcode, group_start=start + len(body), group_length=len(data)))
         body += data

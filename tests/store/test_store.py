@@ -273,30 +273,30 @@ def test_what_is_kept_in_memory_and_laid_out_at_once_changes_no_byte(
     batches = [batch_of(topic, 2_000, share=share, step_ns=step) for topic, share in shares.items()]
     before = written(tmp_path / "a.mcap", batches).read_bytes()
     for most in (1, 20_000):  # bytes in memory
-        monkeypatch.setattr("groundstation.store.writer.MEMORY_BYTES", most)
+        monkeypatch.setattr("groundstation.store.spool.ROOM_BYTES", most)
         assert written(tmp_path / "b.mcap", batches).read_bytes() == before
     monkeypatch.setattr("groundstation.store.channel._together", lambda pieces, _rows: ([piece] for piece in pieces))
     assert written(tmp_path / "c.mcap", batches).read_bytes() == before
 
 
-def test_the_newest_chunks_stay_in_memory_and_only_those_before_them_are_written_twice(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_chunks_beyond_the_memory_go_to_a_file_that_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     batches = [batch_of("ins", 2_000, first=2_000 * k, step_ns=CHUNK_SPAN_NS // 700) for k in range(4)]
     path, most = written(tmp_path / "a.mcap", batches), 60_000
-    spooled: list[int] = []
+    spooled = list[int]()
 
-    class Spool(BytesIO):
+    class Told(BytesIO):
         def writelines(self, parts: Iterable[bytes]) -> None:  # type: ignore[override]
             spooled.append(self.write(b"".join(parts)))
 
-    monkeypatch.setattr("groundstation.store.writer.tempfile.TemporaryFile", lambda dir: Spool())
-    monkeypatch.setattr("groundstation.store.writer.MEMORY_BYTES", most)
+    spool = Told()
+    monkeypatch.setattr("groundstation.store.spool.tempfile.TemporaryFile", lambda dir: spool)
+    monkeypatch.setattr("groundstation.store.spool.ROOM_BYTES", most)
     assert written(tmp_path / "b.mcap", batches).read_bytes() == path.read_bytes()
     with path.open("rb") as file:
         index = make_reader(file).get_summary().chunk_indexes
     sizes = [one.chunk_length + one.message_index_length for one in index if one.message_index_offsets]
     assert sum(sizes) - most <= sum(spooled) < sum(sizes) - most + max(sizes)
+    assert spool.closed
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
