@@ -103,12 +103,12 @@ def _summary(reader: Reader) -> str:
     return next(iter((reader.__doc__ or "").strip().splitlines()), "")
 
 
-def identify(path: str | Path, profile: Path | None = None) -> Claim:
+def identify(path: str | Path | Source, profile: Path | None = None) -> Claim:
     """Find out which reader claims a file.
 
     Parameters
     ----------
-    path : path of the log
+    path : path of the log, or a :class:`Source`, which remembers the claim
     profile : path of a profile (TOML), optional
         With it, the file is a table of that layout whatever it looks like; of a bag it explains messages.
 
@@ -119,16 +119,16 @@ def identify(path: str | Path, profile: Path | None = None) -> Claim:
     SettingsError
         When the profile cannot be used.
     """
-    return _claim(Source(Path(path)), profile)[0]
+    return _claim(_source_of(path), profile)[0]
 
 
 def read(path: str | Path | Source, profile: Path | None = None, icds: "Sequence[Icd]" = ()) -> Iterator[Item]:
     """Iterate over the items of a file, with the reader that claims it.
 
     Raises at once as :func:`identify` does, not at the first item. Parameters as there; a :class:`Source` that is read
-    again is not decompressed again. ``icds`` name the bus words of a recording that has any.
+    again is not decompressed and not asked about again. ``icds`` name the bus words of a recording that has any.
     """
-    source = path if isinstance(path, Source) else Source(Path(path))
+    source = _source_of(path)
     claim, troubles = _claim(source, profile)
     reader = _reader(claim.reader)
     if reader is bags:
@@ -181,8 +181,21 @@ def _guarded(reader: Reader, claim: Claim, source: Source) -> Iterator[Item]:
         raise UnreadableLogError(source.name, f"reader {claim.reader!r} failed ({_named(error)})") from error
 
 
-@np.errstate(all="ignore")  # the first bytes of a file, taken for numbers, may be any
+def _source_of(path: str | Path | Source) -> Source:
+    return path if isinstance(path, Source) else Source(Path(path))
+
+
 def _claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]]:
+    """Return the claim on a source, found once, and troubles with plug-ins."""
+    key = _claim, profile
+    if key not in source.seen:
+        source.seen[key] = _new_claim(source, profile)
+    found: tuple[Claim, tuple[str, ...]] = source.seen[key]
+    return found
+
+
+@np.errstate(all="ignore")  # the first bytes of a file, taken for numbers, may be any
+def _new_claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]]:
     if source.is_empty or magic.companion(source) is not None:
         raise _unclaimed(source, [], [])
     if profile is not None:

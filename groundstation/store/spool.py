@@ -9,7 +9,7 @@ ROOM_BYTES = 1 << 20  # kept in memory: more is no faster, as new memory takes a
 
 
 class Kept(NamedTuple):
-    """Where bytes stand: in memory, or in the file behind it."""
+    """Place of bytes: in memory, or in the file behind it."""
 
     start: int
     nbytes: int

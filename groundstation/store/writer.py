@@ -215,7 +215,7 @@ class StoreWriter:
         return name
 
     def _hand_over(self, chunk: Chunk) -> None:
-        """Take in a chunk; a thread compresses it together with others, as each handing over takes time.
+        """Take in a chunk; a thread compresses several together, as each handing over takes time.
 
         Waits while too many are on their way, and raises what went wrong with those.
         """

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,7 +32,7 @@ class Log:
     names of shipped ones; with ``has_new_names`` it is an MCAP whose bus words they name, and read as its log again.
     ``segment`` is the only one of the power-ups in it that is read; ``whole`` then gives the items of all, if they are
     kept. ``parts`` are the consecutive files that are read as one; its source has the digest of the first, and
-    ``digests`` are those of all.
+    ``digests`` are those of all. ``file`` is what was asked for its reader.
     """
 
     path: Path
@@ -45,6 +45,7 @@ class Log:
     whole: "Replay | None" = None
     parts: tuple[Path, ...] = ()
     digests: tuple[str, ...] = ()
+    file: "LogFile | None" = field(default=None, repr=False, compare=False)
 
     def items(self) -> Iterator[Item]:
         """Read the log from its beginning, in bounded batches."""
@@ -98,7 +99,7 @@ class Log:
         from groundstation.readers.source import Source as LogFile
 
         if not self.parts:
-            return LogFile(self.path)
+            return self.file or LogFile(self.path)
         from groundstation.readers.joined import JoinedSource
 
         return JoinedSource(self.path, tuple(map(LogFile, self.parts)))
@@ -158,6 +159,7 @@ def open_log(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()
         When no reader claims it, or it is an MCAP of another program.
     """
     from groundstation.readers.registry import identify
+    from groundstation.readers.source import Source as LogFile
 
     path = as_log(path)
     if not path.is_file():
@@ -171,9 +173,11 @@ def open_log(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()
         source = Source(name, sha256, size, f"groundstation-mcap of {info.reader}")
         is_renamed = bool(icds) and any(topic.startswith(BUS_PREFIX) for topic in info.ledger.topics)
         return Log(path, source, not is_renamed, profile, icds, has_new_names=is_renamed)
-    claim = identify(path, profile)
+    file = LogFile(path)
+    claim = identify(file, profile)
     size = sum(file.stat().st_size for file in _files_of(path))
-    return Log(path, Source(log_name(path), digest_of(path), size, claim.title), False, profile, icds)
+    source = Source(log_name(path), digest_of(path), size, claim.title)
+    return Log(path, source, False, profile, icds, file=file)
 
 
 def open_one_of_several(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()) -> Log:
