@@ -15,6 +15,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock_steps import quantiles
 from groundstation.integrity.limits import GapLimits, RhythmLimits, Thresholds
 
+AT_ONCE = 1 << 18  # steps of which some are taken
 MOST_STEPS = 10_000  # steps from which a typical step is taken
 WHOLE = 0.2  # periods that a step may be off a whole number of them
 MOST_SKIPPED = 10.0  # periods: a longer step that is no gap explains nothing
@@ -109,20 +110,39 @@ def rhythm_of(topic: str, time_ns: Int64Array, thresholds: Thresholds, pauses: S
     mean step, but no nominal rate. Time within ``pauses`` of the log is no time of the topic.
     """
     limits, steps = thresholds.rhythm, _steps_ns(time_ns, pauses)
-    ahead = steps if steps.min(initial=1) > 0 else steps[steps > 0]
-    if not len(ahead):
+    ahead = len(steps) if steps.min(initial=1) > 0 else int(np.count_nonzero(steps > 0))
+    if not ahead:
         return Rhythm(steps, 0, 0.0, False, False, thresholds.gaps)
-    some = ahead[:: len(ahead) // MOST_STEPS | 1]  # odd: two steps in turn are both met
-    usual_ns, long_ns = quantiles(some, (0.5, 0.8))
+    usual_ns, long_ns = quantiles(_some_ahead(steps, ahead), (0.5, 0.8))
     rows = (int(np.searchsorted(time_ns, one.start_ns, "right")) - 1 for one in pauses)
     paused = tuple(row for row in rows if 0 <= row < len(steps))
-    found = Rhythm(steps, len(ahead), usual_ns, True, True, thresholds.gaps, tuple(pauses), paused)
+    found = Rhythm(steps, ahead, usual_ns, True, True, thresholds.gaps, tuple(pauses), paused)
     if _is_sporadic(topic, found, long_ns, limits):
         return replace(found, has_rate=False, has_gaps=False)
     if _is_unexplained(found, limits):
-        mean_ns = int(steps.sum()) / len(ahead)
+        mean_ns = found.span_ns / ahead
         return replace(found, period_ns=mean_ns, has_rate=False, has_gaps=is_canonical(topic))
     return found
+
+
+def _some_ahead(steps_ns: Int64Array, ahead: int) -> Int64Array:
+    """Return every so manieth of the steps ahead, whose number is ``ahead``; a long log's are gone through in parts.
+
+    Examples
+    --------
+    >>> _some_ahead(np.array([3, 0, 4, 5]), 3).tolist()
+    [3, 4, 5]
+    """
+    every = ahead // MOST_STEPS | 1  # odd: two steps in turn are both met
+    if ahead == len(steps_ns):
+        return steps_ns[::every]
+    parts, seen = [], 0
+    for start in range(0, len(steps_ns), AT_ONCE):
+        part = steps_ns[start : start + AT_ONCE]
+        part = part[part > 0]
+        parts.append(part[-seen % every :: every].copy())  # a view would hold the whole part
+        seen += len(part)
+    return np.concatenate(parts)
 
 
 def _steps_ns(time_ns: Int64Array, pauses: Sequence[Pause]) -> Int64Array:

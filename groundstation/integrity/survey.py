@@ -205,6 +205,7 @@ def _times(
         for topic in topics:
             backward = steps.counts.get(topic, order.backward_steps)
             yield _Times(topic, order.valid_ns, backward, order.stray_rows, order.lateness_ns)
+        del order  # before the times of the next topic are laid together: those of one are in memory at a time
 
 
 def _counted(
@@ -246,6 +247,7 @@ def _count(
         ledgers.append(ledger)
         lateness_ns[topic] = late_ns
         outlines.append(outline_of(topic, time_ns, rhythm, limits.gaps))
+        del time_ns, rhythm
     ledgers.sort(key=lambda ledger: ledger.topic)
     return _Counted(tuple(ledgers), lateness_ns, tuple(one for one in outlines if one is not None))
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from groundstation.base.records import Column, Item, LogHeader, RecordBatch
-from groundstation.integrity import places, survey
-from groundstation.integrity.survey import Survey
+from groundstation.integrity import places, rhythm
+from groundstation.integrity.survey import Survey, survey
 
 NS = 10**9
 PERIOD_SHARE = 0.05  # its median is over all records of a long log, over those that are believed of others
@@ -83,3 +83,35 @@ def test_memory_of_a_survey_hardly_grows_with_the_log(monkeypatch: pytest.Monkey
         tracemalloc.stop()
         assert sum(topic.rows for topic in found.ledger.topics) == blocks * 60_000
     assert peaks[1] < 24e6 and peaks[1] - peaks[0] < 4e6, peaks
+
+
+def two_topics(blocks: int) -> Iterator[Item]:
+    """Blocks of 50 000 records of two topics; of two records one after the other, both have one time."""
+    yield LogHeader("test", has_counting_clock=True)
+    for block in range(blocks):
+        index = np.arange(100_000) + block * 100_000
+        for number in range(2):
+            which = index[number::2]
+            yield RecordBatch(f"raw.t{number}", which, Column(which // 4 * 10_000_000), {})
+
+
+def test_times_of_one_topic_alone_are_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are its times and its steps, 16 bytes a record, and what marks some: not those of the topic before too."""
+    monkeypatch.setattr(places, "WINDOW_RECORDS", 100_000)
+    monkeypatch.setattr(places, "MEMORY_BYTES", 1 << 20)
+    blocks = 40
+    tracemalloc.start()
+    found = survey(two_topics(blocks))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert [topic.duplicates for topic in found.ledger.topics] == [1_000_000, 1_000_000]
+    assert peak < 24 * blocks * 50_000, peak
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_steps_ahead_in_parts(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    steps = np.random.default_rng(seed).integers(0, 3, 5_000)
+    monkeypatch.setattr(rhythm, "MOST_STEPS", 300)
+    monkeypatch.setattr(rhythm, "AT_ONCE", 37)
+    ahead = steps[steps > 0]
+    assert np.array_equal(rhythm._some_ahead(steps, len(ahead)), ahead[:: len(ahead) // 300 | 1])

@@ -162,3 +162,23 @@ def test_of_one_time_the_first_present_value_of_each_field_is_kept() -> None:
     assert table.values("latitude_deg").tolist() == [55.0, 56.0, 57.0]
     assert table.values("roll_deg").tolist() == [1.0, 2.0, 3.0]
     assert np.array_equal(table.values("velocity_north_mps"), [7.0, 8.0, np.nan], equal_nan=True)
+
+
+def test_columns_of_a_topic_share_one_piece_of_memory() -> None:
+    """The system then gives large pages for it: a long table is made with a third of the page faults."""
+    ins = gather(
+        batch("ins", [10, 20], roll_deg=[1.0, 2.0], samples=[1, 2], mode=["nav", "nav"]),
+        batch("ins", [30, 40], 2, roll_deg=[3.0, 4.0], samples=[3, 4], mode=["off", "nav"]),
+    )["ins"]
+    table = flight_from_batches(
+        batches_from_flight(Flight({"ins": ins}, {}, 10, True), max_rows=1),
+        metadata={},
+        has_utc=True,
+        source_name="a.csv",
+        rows={"ins": 4},
+    )["ins"]
+    arrays = [table.time_ns, table.record_index, table.device_time_ns.values]
+    arrays += [table.columns[name].values for name in ("roll_deg", "samples", "mode")]
+    places = [array.__array_interface__["data"][0] for array in arrays]
+    assert table.text("mode").tolist() == ["nav", "nav", "off", "nav"]
+    assert max(places) - min(places) < 6 * 64 and len(set(places)) == 6

@@ -7,6 +7,7 @@ import numpy as np
 
 from groundstation.base.angles import wrap_360
 from groundstation.base.records import BoolArray, Column, RecordBatch
+from groundstation.base.sorted_values import distinct
 from groundstation.base.units import MPS_PER_KMH, MPS_PER_KNOT
 from groundstation.readers.layout import velocity_from_track
 from groundstation.readers.receiver.credible import HEADINGS, credible_attitude, credible_dilution, credible_position
@@ -202,7 +203,7 @@ def _signals(epochs: SentenceEpochs) -> Columns:
     if not owners or not sum(map(len, owners)):
         return {}
     owner, strength_dbhz = np.concatenate(owners), np.concatenate(strengths)
-    pairs = np.unique(owner * 1_000_000 + np.concatenate(satellites).astype(np.int64))
+    pairs = distinct(owner * 1_000_000 + np.concatenate(satellites).astype(np.int64))
     tracked = np.bincount(pairs // 1_000_000, minlength=len(epochs)).astype(np.float64)
     number_of = np.bincount(owner, minlength=len(epochs))
     mean_dbhz = np.bincount(owner, weights=strength_dbhz, minlength=len(epochs)) / np.maximum(number_of, 1)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from groundstation.base.compile import in_place, inlined
 from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import BoolArray, Column, Int64Array
+from groundstation.base.sorted_values import distinct
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.receiver import scan
 from groundstation.readers.receiver.sentence_layouts import FAMILIES, FORMATTERS
@@ -24,6 +25,7 @@ from groundstation.readers.receiver.stream import Frames
 COMMA, STAR, POINT, MINUS, PLUS, MAKERS = 44, 42, 46, 45, 43, 80  # P begins a maker's own address
 CHECKSUM_BYTES = 3
 MOST_DIGITS = 18  # digits of a number: more do not fit 64 bits
+_POWERS = 10.0 ** np.arange(MOST_DIGITS + 1)  # looked up: to raise ten anew takes ten times as long
 MOST_BEHIND = 13  # digits behind the point of an angle
 ADDRESS_BYTES = 30  # longest address, such as PQTMCFGORIENTATIONERROR, and longest word behind it
 NAMELESS = "sentence"  # in place of an address that is none: such sentences are kept as text
@@ -274,9 +276,8 @@ class Sentences:
 
     def _text(self, begin: Int64Array, size: Int64Array) -> Column:
         width = max(int(size.max(initial=0)), 1)
-        content = self.frames.bytes_at(begin, width)
-        content = np.where(np.arange(width) < size[:, None], content, 0).astype(np.uint8)
-        texts = np.ascontiguousarray(content).view(f"S{width}")[:, 0].astype(f"U{width}")
+        content = np.where(np.arange(width) < size[:, None], self.frames.bytes_at(begin, width), 0)
+        texts = content.astype(np.uint32, order="C").view(f"U{width}")[:, 0]  # a sentence is ASCII
         return Column(texts, None if (size > 0).all() else size > 0)
 
     def _rest(self) -> Column:
@@ -299,7 +300,7 @@ class Sentences:
             return Column(day_ns / NS_PER_S, present & sound)
         if kind == "d":
             return self._date(value, present)
-        return Column(value / 10.0**behind, present)
+        return Column(_decimal(value, behind), present)
 
     def _angle(self, number: int, name: str, told: Column, behind: Int64Array) -> Column:
         """Return the latitude or longitude with the sign of its hemisphere, in the next field.
@@ -317,8 +318,9 @@ class Sentences:
         return Column(np.where(letters == negative, -degrees, degrees), told.mask & is_angle)
 
     def _date(self, value: Int64Array, present: BoolArray) -> Column:
-        texts = np.array([f"{date:06d}" for date in np.unique(value).tolist()] or [""])
-        where = np.searchsorted(np.unique(value), value)
+        dates = distinct(value)
+        texts = np.array([f"{date:06d}" for date in dates.tolist()] or [""])
+        where = np.searchsorted(dates, value)
         return Column(texts[where], present)
 
     def _with_old_form(self, found: dict[str, Column]) -> dict[str, Column]:
@@ -332,7 +334,7 @@ class Sentences:
         for number, name in enumerate(("cogt", "cogm", "sogn", "sogk")):
             value, behind, state = self.numbers(number)
             column = found[name]
-            told = Column(np.where(old, value / 10.0**behind, column.values), np.where(old, state == 1, column.mask))
+            told = Column(np.where(old, _decimal(value, behind), column.values), np.where(old, state == 1, column.mask))
             unit = found[f"{name}Unit"]
             found |= {name: told, f"{name}Unit": Column(unit.values, unit.mask & ~old)}
         return found
@@ -349,7 +351,7 @@ class Sentences:
 
     def _with_signal(self, found: dict[str, Column]) -> dict[str, Column]:
         signals = np.zeros(len(self), dtype="<U4")
-        for number in np.unique(self._signal[self._signal != _NO_FIELD]).tolist():
+        for number in distinct(self._signal[self._signal != _NO_FIELD]).tolist():
             rows = self._signal == number
             signals[rows] = self.texts(number).values[rows]
         return found | {"signalID": Column(signals, signals != "")}
@@ -376,8 +378,8 @@ def sentences_of(frames: Frames) -> Iterator[Sentences]:
     keys, sizes = np.zeros(len(which), dtype=np.int64), np.zeros(len(which), dtype=np.int64)
     _addresses(frames.data, frames.offsets[which], _families(), keys, sizes)
     order = np.argsort(keys, kind="stable")
-    _distinct, starts = np.unique(keys[order], return_index=True)
-    for rows in np.split(order, starts[1:]):
+    ordered = keys[order]
+    for rows in np.split(order, np.flatnonzero(ordered[1:] != ordered[:-1]) + 1):
         at, size = int(frames.offsets[which[rows[0]]]) + 1, int(sizes[rows[0]])
         name = frames.data[at : at + size].tobytes().decode("ascii").replace(",", ".")
         yield Sentences(name or NAMELESS, frames, which[rows])
@@ -401,6 +403,17 @@ def time_of_day_ns(value: Int64Array, behind: Int64Array) -> tuple[Int64Array, B
     day_ns, sound = np.zeros(len(value), dtype=np.int64), np.zeros(len(value), dtype=bool)
     _times_of_day(value, behind, day_ns, sound)
     return day_ns, sound
+
+
+def _decimal(value: Int64Array, behind: Int64Array) -> NDArray[np.float64]:
+    """Return the numbers of digits as one integer and of how many of them stand behind the point.
+
+    Examples
+    --------
+    >>> _decimal(np.array([4_705, -12]), np.array([2, 0])).tolist()
+    [47.05, -12.0]
+    """
+    return np.asarray(value / _POWERS[behind])
 
 
 def _degrees(value: Int64Array, behind: Int64Array) -> tuple[NDArray[np.float64], BoolArray]:
