@@ -23,15 +23,29 @@ from groundstation.systems.trajectory.states import (
 
 
 @in_place
-def back_over_scalar(
-    at: int, linear: Linear, solved: Solved, a: FloatArray, A: FloatArray, u: FloatArray, own: FloatArray
-) -> None:
-    """Take the adjoint back over one scalar measurement.
+def adjoint_over_scalar(at: int, linear: Linear, solved: Solved, a: FloatArray) -> float:
+    """Take the adjoint back over one scalar measurement: a <- (I - K h)' a - h' y / S.
 
-    a <- (I - K h)' a - h' y / S; A <- (I - K h)' A (I - K h) + h' h / S. ``own`` (2,) is filled: the adjoint of the
-    noise of the measurement itself, squared, and its covariance.
+    Returns the adjoint of the noise of the measurement itself.
     """
-    K, weight = solved.K[at], 1.0 / solved.S[at]
+    K = solved.K[at]
+    total = solved.y[at] * (1.0 / solved.S[at])
+    for j in range(STATES):
+        total += K[j] * a[j]
+    for e in range(WIDTH):
+        value = linear.h[at, e]
+        if value != 0.0:
+            a[linear.columns[at, e]] -= value * total
+    return total
+
+
+@in_place
+def spread_over_scalar(at: int, linear: Linear, solved: Solved, A: FloatArray, u: FloatArray) -> float:
+    """Take the adjoint's covariance back over one: A <- (I - K h)' A (I - K h) + h' h / S.
+
+    Returns that of the noise of the measurement itself.
+    """
+    K, inner = solved.K[at], 1.0 / solved.S[at]
     for i in range(STATES):
         u[i] = 0.0
     for j in range(STATES):  # u = A K
@@ -39,16 +53,13 @@ def back_over_scalar(
         if value != 0.0:
             for i in range(STATES):
                 u[i] += value * A[j, i]
-    total, inner = solved.y[at] * weight, weight
     for j in range(STATES):
-        total += K[j] * a[j]
         inner += K[j] * u[j]
     for e in range(WIDTH):
         value = linear.h[at, e]
         if value == 0.0:
             continue
         r = linear.columns[at, e]
-        a[r] -= value * total
         for j in range(STATES):
             A[r, j] -= value * u[j]
         beside = value * inner - u[r]
@@ -59,32 +70,42 @@ def back_over_scalar(
             r = linear.columns[at, e]
             for j in range(STATES):
                 A[j, r] = A[r, j]
-    own[0], own[1] = total * total, inner
+    return inner
 
 
 @in_place
-def back_over_step(
-    e: int, pattern: Pattern, linear: Linear, a: FloatArray, A: FloatArray, w: FloatArray, u: FloatArray
-) -> None:
-    """Take the adjoint back over the transition that leads to epoch e: a <- F' a, A <- F' A F.
+def adjoint_over_step(e: int, pattern: Pattern, linear: Linear, a: FloatArray, u: FloatArray) -> None:
+    """Take the adjoint back over the transition that leads to epoch e: a <- F' a.
 
     The rows of navigation are a block over the states before LEV, each other row of the pattern has a factor alone.
     """
     F = linear.F[e]
+    for c in range(LEV):
+        total = a[c] if c >= NAVIGATION else 0.0
+        for r in range(NAVIGATION):
+            total += F[r * LEV + c] * a[r]
+        u[c] = total
+    for c in range(LEV):
+        a[c] = u[c]
+    rows, starts, _columns = pattern
+    for t in range(NAVIGATION, len(rows)):
+        a[rows[t]] *= F[starts[t]]
+
+
+@in_place
+def spread_over_step(e: int, pattern: Pattern, linear: Linear, A: FloatArray, w: FloatArray) -> None:
+    """Take the adjoint's covariance back over the transition that leads to epoch e: A <- F' A F."""
+    F = linear.F[e]
     for c in range(LEV):  # w = F' A, the rows that change by navigation
         keep = 1.0 if c >= NAVIGATION else 0.0
-        total = keep * a[c]
         for j in range(STATES):
             w[c, j] = keep * A[c, j]
         for r in range(NAVIGATION):
             value = F[r * LEV + c]
             if value != 0.0:
-                total += value * a[r]
                 for j in range(STATES):
                     w[c, j] += value * A[r, j]
-        u[c] = total
     for c in range(LEV):  # (F' A) F
-        a[c] = u[c]
         for j in range(c, STATES):
             A[c, j] = w[c, j] if j >= NAVIGATION else 0.0
         for r in range(NAVIGATION):
@@ -94,7 +115,6 @@ def back_over_step(
     rows, starts, _columns = pattern
     for t in range(NAVIGATION, len(rows)):
         r, value = rows[t], F[starts[t]]
-        a[r] *= value
         for i in range(r + 1):
             A[i, r] *= value
         for j in range(r, STATES):
@@ -110,29 +130,32 @@ def run_backward(
     pattern: Pattern,
     linear: Linear,
     solved: Solved,
-    begin: int,
     end: int,
+    spread_from: int,
     seldom: int,
     a: FloatArray,
     A: FloatArray,
     w: FloatArray,
     u: FloatArray,
-    own: FloatArray,
     x: FloatArray,
     variance: FloatArray,
     plane: FloatArray,
     first_x: FloatArray,
     first_p: FloatArray,
 ) -> None:
-    """Smooth epochs ``end - 1`` back to ``begin``.
+    """Smooth epochs ``end - 1`` back to the first.
 
     Parameters
     ----------
+    solved : Solved
+        ``row`` tells which epochs are smoothed.
+    spread_from : int
+        First epoch with a variance that is wanted; ``end`` where none is.
     seldom : int
         Epochs between two variances of the biases, which walk slowly.
     a, A : ndarrays, shapes (n,), (n, n)
         Zero at the end of the data; changed in place.
-    w, u, own : ndarrays, shapes (n, n), (n,), (2,)
+    w, u : ndarrays, shapes (n, n), (n,)
         Room.
     x, variance : ndarrays, shapes (e, KEPT_ROWS), (e, KEPT_ROWS)
         Filled: smoothed correction to the estimate before the measurements of each epoch, and its variance.
@@ -141,34 +164,41 @@ def run_backward(
     first_x : ndarray, shape (n,)
         Filled: p a at the start with the covariance ``first_p`` of the start, negative: correction of the start.
     """
-    for e in range(end - 1, begin - 1, -1):
+    for e in range(end - 1, -1, -1):
+        is_spread, row = e >= spread_from, solved.row[e]
         for m in range(schedule.seen[e + 1] - 1, schedule.seen[e] - 1, -1):
             for i in range(2, -1, -1):
                 if solved.mark[3 * m + i] == 1:
-                    back_over_scalar(3 * m + i, linear, solved, a, A, u, own)
-        for i in range(KEPT_ROWS):
+                    if is_spread:
+                        spread_over_scalar(3 * m + i, linear, solved, A, u)
+                    adjoint_over_scalar(3 * m + i, linear, solved, a)
+        for i in range(KEPT_ROWS if row >= 0 else 0):
             total, spread, beside = 0.0, 0.0, 0.0
             for j in range(STATES):
-                total += solved.p[e, i, j] * a[j]
+                total += solved.p[row, i, j] * a[j]
             x[e, i] = -total
+            if not is_spread:
+                continue
             if i >= NAVIGATION and e % seldom != 0 and e < end - 1:  # biases walk slowly
                 variance[e, i] = variance[e + 1, i]
                 continue
             for j in range(STATES):
                 u[j] = 0.0
             for r in range(STATES):  # u = A p
-                value = solved.p[e, i, r]
+                value = solved.p[row, i, r]
                 if value != 0.0:
                     for j in range(STATES):
                         u[j] += value * A[r, j]
             for j in range(STATES):
-                spread += solved.p[e, i, j] * u[j]
-            variance[e, i] = solved.p[e, i, i] - spread
+                spread += solved.p[row, i, j] * u[j]
+            variance[e, i] = solved.p[row, i, i] - spread
             if i in (1, ATT + 1):
                 for j in range(STATES):
-                    beside += solved.p[e, i - 1, j] * u[j]
-                plane[e, 0 if i == 1 else 1] = solved.p[e, i - 1, i] - beside
-        back_over_step(e, pattern, linear, a, A, w, u)
+                    beside += solved.p[row, i - 1, j] * u[j]
+                plane[e, 0 if i == 1 else 1] = solved.p[row, i - 1, i] - beside
+        if is_spread:
+            spread_over_step(e, pattern, linear, A, w)
+        adjoint_over_step(e, pattern, linear, a, u)
     for i in range(STATES):
         total = 0.0
         for j in range(STATES):

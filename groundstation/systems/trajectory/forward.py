@@ -284,9 +284,10 @@ def run_forward(
             predict(e, noise, pattern, now, room, linear)
             keeps = solved.before.shape[0] > 0
             if keeps:
-                for i in range(KEPT_ROWS):
+                row = solved.row[e]
+                for i in range(KEPT_ROWS if row >= 0 else 0):
                     for j in range(STATES):
-                        solved.p[e, i, j] = now.p[i, j]
+                        solved.p[row, i, j] = now.p[i, j]
                 solved.tilt[e, 0] = now.p[ATT, ATT + 1]
                 for j in range(STATES):
                     solved.before[e, j] = room.x[0, j]
