@@ -20,17 +20,16 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def both(first: Callable[[], object], second: Callable[[], object]) -> None:
-    """Run two functions at once, the second in a thread of its own.
+def both(first: Callable[[], Other], second: Callable[[], object]) -> Other:
+    """Run two functions at once, the second in a thread of its own; return what the first does.
 
     It is for work in compiled loops, which run beside Python. Raises what one of them raises, when both have ended.
 
     Examples
     --------
     >>> done = []
-    >>> both(lambda: done.append(1), lambda: done.append(2))
-    >>> sorted(done)
-    [1, 2]
+    >>> both(lambda: len("four"), lambda: done.append(2)), done
+    (4, [2])
     """
     errors: list[BaseException] = []
 
@@ -43,11 +42,12 @@ def both(first: Callable[[], object], second: Callable[[], object]) -> None:
     thread = Thread(target=run, name="half")
     thread.start()
     try:
-        first()
+        made = first()
     finally:
         thread.join()
     if errors:
         raise errors[0]
+    return made
 
 
 def two_at_once(function: Callable[[One], Other], items: Sequence[One]) -> list[Other]:

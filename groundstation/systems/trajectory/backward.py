@@ -6,7 +6,7 @@ covariance p - p A p. They go back over the gains that the filter kept; no matri
 Source: G. J. Bierman, Fixed interval smoothing with discrete measurements, Int. J. Control 18, 1973.
 """
 
-from groundstation.base.compile import in_place
+from groundstation.base.compile import in_place, inlined
 from groundstation.methods.kalman.arrays import Pattern
 from groundstation.systems.trajectory.states import (
     ATT,
@@ -39,6 +39,21 @@ def adjoint_over_scalar(at: int, linear: Linear, solved: Solved, a: FloatArray) 
     return total
 
 
+@inlined
+def fill_product(A: FloatArray, v: FloatArray, u: FloatArray) -> None:
+    """Fill u with A v of a symmetric A, five columns at once: one after the other they take twice as long."""
+    for i in range(STATES):
+        u[i] = 0.0
+    for j in range(0, STATES, 5):
+        for i in range(STATES):
+            total = u[i] + v[j] * A[j, i]
+            total += v[j + 1] * A[j + 1, i]
+            total += v[j + 2] * A[j + 2, i]
+            total += v[j + 3] * A[j + 3, i]
+            total += v[j + 4] * A[j + 4, i]
+            u[i] = total
+
+
 @in_place
 def spread_over_scalar(at: int, linear: Linear, solved: Solved, A: FloatArray, u: FloatArray) -> float:
     """Take the adjoint's covariance back over one: A <- (I - K h)' A (I - K h) + h' h / S.
@@ -46,13 +61,7 @@ def spread_over_scalar(at: int, linear: Linear, solved: Solved, A: FloatArray, u
     Returns that of the noise of the measurement itself.
     """
     K, inner = solved.K[at], 1.0 / solved.S[at]
-    for i in range(STATES):
-        u[i] = 0.0
-    for j in range(STATES):  # u = A K
-        value = K[j]
-        if value != 0.0:
-            for i in range(STATES):
-                u[i] += value * A[j, i]
+    fill_product(A, K, u)
     for j in range(STATES):
         inner += K[j] * u[j]
     for e in range(WIDTH):
@@ -96,22 +105,38 @@ def adjoint_over_step(e: int, pattern: Pattern, linear: Linear, a: FloatArray, u
 def spread_over_step(e: int, pattern: Pattern, linear: Linear, A: FloatArray, w: FloatArray) -> None:
     """Take the adjoint's covariance back over the transition that leads to epoch e: A <- F' A F."""
     F = linear.F[e]
-    for c in range(LEV):  # w = F' A, the rows that change by navigation
+    for c in range(LEV):  # w = F' A, the rows that change by navigation, which are nine
         keep = 1.0 if c >= NAVIGATION else 0.0
+        f0, f1, f2, f3, f4 = F[c], F[LEV + c], F[2 * LEV + c], F[3 * LEV + c], F[4 * LEV + c]
+        f5, f6, f7, f8 = F[5 * LEV + c], F[6 * LEV + c], F[7 * LEV + c], F[8 * LEV + c]
         for j in range(STATES):
-            w[c, j] = keep * A[c, j]
-        for r in range(NAVIGATION):
-            value = F[r * LEV + c]
-            if value != 0.0:
-                for j in range(STATES):
-                    w[c, j] += value * A[r, j]
+            total = keep * A[c, j] + f0 * A[0, j] + f1 * A[1, j] + f2 * A[2, j] + f3 * A[3, j]
+            w[c, j] = total + f4 * A[4, j] + f5 * A[5, j] + f6 * A[6, j] + f7 * A[7, j] + f8 * A[8, j]
     for c in range(LEV):  # (F' A) F
-        for j in range(c, STATES):
-            A[c, j] = w[c, j] if j >= NAVIGATION else 0.0
-        for r in range(NAVIGATION):
-            value = w[c, r]
-            for j in range(c, LEV):
-                A[c, j] += value * F[r * LEV + j]
+        f0, f1, f2, f3, f4, f5, f6, f7, f8 = (
+            w[c, 0],
+            w[c, 1],
+            w[c, 2],
+            w[c, 3],
+            w[c, 4],
+            w[c, 5],
+            w[c, 6],
+            w[c, 7],
+            w[c, 8],
+        )
+        for j in range(c, LEV):
+            total = w[c, j] if j >= NAVIGATION else 0.0
+            total += f0 * F[j]
+            total += f1 * F[LEV + j]
+            total += f2 * F[2 * LEV + j]
+            total += f3 * F[3 * LEV + j]
+            total += f4 * F[4 * LEV + j]
+            total += f5 * F[5 * LEV + j]
+            total += f6 * F[6 * LEV + j]
+            total += f7 * F[7 * LEV + j]
+            A[c, j] = total + f8 * F[8 * LEV + j]
+        for j in range(LEV, STATES):
+            A[c, j] = w[c, j]
     rows, starts, _columns = pattern
     for t in range(NAVIGATION, len(rows)):
         r, value = rows[t], F[starts[t]]
@@ -182,13 +207,7 @@ def run_backward(
             if i >= NAVIGATION and e % seldom != 0 and e < end - 1:  # biases walk slowly
                 variance[e, i] = variance[e + 1, i]
                 continue
-            for j in range(STATES):
-                u[j] = 0.0
-            for r in range(STATES):  # u = A p
-                value = solved.p[row, i, r]
-                if value != 0.0:
-                    for j in range(STATES):
-                        u[j] += value * A[r, j]
+            fill_product(A, solved.p[row, i], u)
             for j in range(STATES):
                 spread += solved.p[row, i, j] * u[j]
             variance[e, i] = solved.p[row, i, i] - spread

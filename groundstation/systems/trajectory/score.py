@@ -13,6 +13,7 @@ import numpy as np
 
 from groundstation.base.compile import in_place
 from groundstation.base.dataclasses import dataclass
+from groundstation.base.halves import both
 from groundstation.methods.kalman.arrays import Pattern
 from groundstation.systems.trajectory.backward import (
     adjoint_over_scalar,
@@ -150,21 +151,35 @@ def score_of(
     at : ndarray, shape (n,)
     """
     of = variances(at)
-    value, solved = solved_with(samples, plan, gate, known, end, of)
     a, A, w, u = (np.zeros(shape) for shape in (STATES, (STATES, STATES), (STATES, STATES), STATES))
     by_scalar, by_noise = np.zeros((2, of.seen.size)), np.zeros((2, DENSITIES + VARIANCES))
-    run_score(plan.schedule, PATTERN, known, solved, end, a, A, w, u, by_scalar, by_noise)
+    by_number: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+
+    def go() -> float:
+        value, solved = solved_with(samples, plan, gate, known, end, of)
+        run_score(plan.schedule, PATTERN, known, solved, end, a, A, w, u, by_scalar, by_noise)
+        return value
+
+    def differ() -> None:
+        by_number.extend(_differences(variances, at, one) for one in range(len(at)))
+
+    value = both(go, differ)
     by_start = np.stack([a * a, np.diagonal(A)])
-    sides = np.empty((len(at), 2))
-    for i in range(len(at)):
-        step = np.zeros(len(at))
-        step[i] = STEP
-        up, down = variances(at + step), variances(at - step)
-        noise = np.concatenate([up.noise.density - down.noise.density, up.noise.variance - down.noise.variance])
-        seen = np.nan_to_num(up.seen - down.seen).ravel()
-        start = np.diagonal(up.start.p - down.start.p)
-        sides[i] = (by_noise @ noise + by_scalar @ seen + by_start @ start) / (4.0 * STEP)
+    sides = np.array(
+        [(by_noise @ noise + by_scalar @ seen + by_start @ start) / (4.0 * STEP) for noise, seen, start in by_number]
+    ).reshape(-1, 2)
     return Scored(value, sides[:, 0] - sides[:, 1], sides[:, 1])
+
+
+def _differences(
+    variances: Callable[[FloatArray], Variances], at: FloatArray, number: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return by how much the variances of noise, measurements and start change over two steps of one number."""
+    step = np.zeros(len(at))
+    step[number] = STEP
+    up, down = variances(at + step), variances(at - step)
+    noise = np.concatenate([up.noise.density - down.noise.density, up.noise.variance - down.noise.variance])
+    return noise, np.nan_to_num(up.seen - down.seen).ravel(), np.diagonal(up.start.p - down.start.p)
 
 
 def solved_with(
