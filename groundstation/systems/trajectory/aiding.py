@@ -140,9 +140,9 @@ def _tried(base: Estimate, readings: dict[int, AidReadings], *, fit: bool) -> Es
     )
     model, rules, found = base.model, base.gate, base.fit
     start = problem.restarted(base.result.start, model)
-    result = run_pass(problem.samples, problem.plan(model), problem.noise(model), rules, start)
+    result = run_pass(problem.samples, problem.plan(model), problem.noise(model), rules, start, has_sigmas=False)
     if fit:
-        result = relinearised(problem, model, rules, result, 1)
+        result = relinearised(problem, model, rules, result, 1, has_sigmas=False)
         numbers = tuple(number for kind in readings for number in NUMBERS[kind])
         fresh = fitted(problem, model, result, numbers)
         found = replace(fresh, at_bound=(*found.at_bound, *fresh.at_bound))
@@ -218,8 +218,8 @@ def _with_compass(
         why = _against_motion(chosen[0], plain.hypotheses, ambiguous_below)
         if why:
             return plain, why
-        problem, start, _done = settle(problem, model, rules, start, SETTLE_ROUNDS)
-    result = run_pass(problem.samples, problem.plan(model), problem.noise(model), rules, start)
+        problem, start = settle(problem, model, rules, start, SETTLE_ROUNDS)
+    result = run_pass(problem.samples, problem.plan(model), problem.noise(model), rules, start, has_sigmas=False)
     result = relinearised(problem, model, rules, result)
     if is_open:
         hypotheses = hypotheses_of(without_slip(problem), model, rules)

@@ -6,7 +6,7 @@ covariance p - p A p. They go back over the gains that the filter kept; no matri
 Source: G. J. Bierman, Fixed interval smoothing with discrete measurements, Int. J. Control 18, 1973.
 """
 
-from groundstation.base.compile import in_place
+from groundstation.base.compile import in_place, inlined
 from groundstation.methods.kalman.arrays import Pattern
 from groundstation.systems.trajectory.states import (
     ATT,
@@ -23,32 +23,52 @@ from groundstation.systems.trajectory.states import (
 
 
 @in_place
-def back_over_scalar(
-    at: int, linear: Linear, solved: Solved, a: FloatArray, A: FloatArray, u: FloatArray, own: FloatArray
-) -> None:
-    """Take the adjoint back over one scalar measurement.
+def adjoint_over_scalar(at: int, linear: Linear, solved: Solved, a: FloatArray) -> float:
+    """Take the adjoint back over one scalar measurement: a <- (I - K h)' a - h' y / S.
 
-    a <- (I - K h)' a - h' y / S; A <- (I - K h)' A (I - K h) + h' h / S. ``own`` (2,) is filled: the adjoint of the
-    noise of the measurement itself, squared, and its covariance.
+    Returns the adjoint of the noise of the measurement itself.
     """
-    K, weight = solved.K[at], 1.0 / solved.S[at]
-    for i in range(STATES):
-        u[i] = 0.0
-    for j in range(STATES):  # u = A K
-        value = K[j]
-        if value != 0.0:
-            for i in range(STATES):
-                u[i] += value * A[j, i]
-    total, inner = solved.y[at] * weight, weight
+    K = solved.K[at]
+    total = solved.y[at] * (1.0 / solved.S[at])
     for j in range(STATES):
         total += K[j] * a[j]
+    for e in range(WIDTH):
+        value = linear.h[at, e]
+        if value != 0.0:
+            a[linear.columns[at, e]] -= value * total
+    return total
+
+
+@inlined
+def fill_product(A: FloatArray, v: FloatArray, u: FloatArray) -> None:
+    """Fill u with A v of a symmetric A, five columns at once: one after the other they take twice as long."""
+    for i in range(STATES):
+        u[i] = 0.0
+    for j in range(0, STATES, 5):
+        for i in range(STATES):
+            total = u[i] + v[j] * A[j, i]
+            total += v[j + 1] * A[j + 1, i]
+            total += v[j + 2] * A[j + 2, i]
+            total += v[j + 3] * A[j + 3, i]
+            total += v[j + 4] * A[j + 4, i]
+            u[i] = total
+
+
+@in_place
+def spread_over_scalar(at: int, linear: Linear, solved: Solved, A: FloatArray, u: FloatArray) -> float:
+    """Take the adjoint's covariance back over one: A <- (I - K h)' A (I - K h) + h' h / S.
+
+    Returns that of the noise of the measurement itself.
+    """
+    K, inner = solved.K[at], 1.0 / solved.S[at]
+    fill_product(A, K, u)
+    for j in range(STATES):
         inner += K[j] * u[j]
     for e in range(WIDTH):
         value = linear.h[at, e]
         if value == 0.0:
             continue
         r = linear.columns[at, e]
-        a[r] -= value * total
         for j in range(STATES):
             A[r, j] -= value * u[j]
         beside = value * inner - u[r]
@@ -59,42 +79,67 @@ def back_over_scalar(
             r = linear.columns[at, e]
             for j in range(STATES):
                 A[j, r] = A[r, j]
-    own[0], own[1] = total * total, inner
+    return inner
 
 
 @in_place
-def back_over_step(
-    e: int, pattern: Pattern, linear: Linear, a: FloatArray, A: FloatArray, w: FloatArray, u: FloatArray
-) -> None:
-    """Take the adjoint back over the transition that leads to epoch e: a <- F' a, A <- F' A F.
+def adjoint_over_step(e: int, pattern: Pattern, linear: Linear, a: FloatArray, u: FloatArray) -> None:
+    """Take the adjoint back over the transition that leads to epoch e: a <- F' a.
 
     The rows of navigation are a block over the states before LEV, each other row of the pattern has a factor alone.
     """
     F = linear.F[e]
-    for c in range(LEV):  # w = F' A, the rows that change by navigation
-        keep = 1.0 if c >= NAVIGATION else 0.0
-        total = keep * a[c]
-        for j in range(STATES):
-            w[c, j] = keep * A[c, j]
+    for c in range(LEV):
+        total = a[c] if c >= NAVIGATION else 0.0
         for r in range(NAVIGATION):
-            value = F[r * LEV + c]
-            if value != 0.0:
-                total += value * a[r]
-                for j in range(STATES):
-                    w[c, j] += value * A[r, j]
+            total += F[r * LEV + c] * a[r]
         u[c] = total
-    for c in range(LEV):  # (F' A) F
+    for c in range(LEV):
         a[c] = u[c]
-        for j in range(c, STATES):
-            A[c, j] = w[c, j] if j >= NAVIGATION else 0.0
-        for r in range(NAVIGATION):
-            value = w[c, r]
-            for j in range(c, LEV):
-                A[c, j] += value * F[r * LEV + j]
+    rows, starts, _columns = pattern
+    for t in range(NAVIGATION, len(rows)):
+        a[rows[t]] *= F[starts[t]]
+
+
+@in_place
+def spread_over_step(e: int, pattern: Pattern, linear: Linear, A: FloatArray, w: FloatArray) -> None:
+    """Take the adjoint's covariance back over the transition that leads to epoch e: A <- F' A F."""
+    F = linear.F[e]
+    for c in range(LEV):  # w = F' A, the rows that change by navigation, which are nine
+        keep = 1.0 if c >= NAVIGATION else 0.0
+        f0, f1, f2, f3, f4 = F[c], F[LEV + c], F[2 * LEV + c], F[3 * LEV + c], F[4 * LEV + c]
+        f5, f6, f7, f8 = F[5 * LEV + c], F[6 * LEV + c], F[7 * LEV + c], F[8 * LEV + c]
+        for j in range(STATES):
+            total = keep * A[c, j] + f0 * A[0, j] + f1 * A[1, j] + f2 * A[2, j] + f3 * A[3, j]
+            w[c, j] = total + f4 * A[4, j] + f5 * A[5, j] + f6 * A[6, j] + f7 * A[7, j] + f8 * A[8, j]
+    for c in range(LEV):  # (F' A) F
+        f0, f1, f2, f3, f4, f5, f6, f7, f8 = (
+            w[c, 0],
+            w[c, 1],
+            w[c, 2],
+            w[c, 3],
+            w[c, 4],
+            w[c, 5],
+            w[c, 6],
+            w[c, 7],
+            w[c, 8],
+        )
+        for j in range(c, LEV):
+            total = w[c, j] if j >= NAVIGATION else 0.0
+            total += f0 * F[j]
+            total += f1 * F[LEV + j]
+            total += f2 * F[2 * LEV + j]
+            total += f3 * F[3 * LEV + j]
+            total += f4 * F[4 * LEV + j]
+            total += f5 * F[5 * LEV + j]
+            total += f6 * F[6 * LEV + j]
+            total += f7 * F[7 * LEV + j]
+            A[c, j] = total + f8 * F[8 * LEV + j]
+        for j in range(LEV, STATES):
+            A[c, j] = w[c, j]
     rows, starts, _columns = pattern
     for t in range(NAVIGATION, len(rows)):
         r, value = rows[t], F[starts[t]]
-        a[r] *= value
         for i in range(r + 1):
             A[i, r] *= value
         for j in range(r, STATES):
@@ -110,29 +155,32 @@ def run_backward(
     pattern: Pattern,
     linear: Linear,
     solved: Solved,
-    begin: int,
     end: int,
+    spread_from: int,
     seldom: int,
     a: FloatArray,
     A: FloatArray,
     w: FloatArray,
     u: FloatArray,
-    own: FloatArray,
     x: FloatArray,
     variance: FloatArray,
     plane: FloatArray,
     first_x: FloatArray,
     first_p: FloatArray,
 ) -> None:
-    """Smooth epochs ``end - 1`` back to ``begin``.
+    """Smooth epochs ``end - 1`` back to the first.
 
     Parameters
     ----------
+    solved : Solved
+        ``row`` tells which epochs are smoothed.
+    spread_from : int
+        First epoch with a variance that is wanted; ``end`` where none is.
     seldom : int
         Epochs between two variances of the biases, which walk slowly.
     a, A : ndarrays, shapes (n,), (n, n)
         Zero at the end of the data; changed in place.
-    w, u, own : ndarrays, shapes (n, n), (n,), (2,)
+    w, u : ndarrays, shapes (n, n), (n,)
         Room.
     x, variance : ndarrays, shapes (e, KEPT_ROWS), (e, KEPT_ROWS)
         Filled: smoothed correction to the estimate before the measurements of each epoch, and its variance.
@@ -141,34 +189,35 @@ def run_backward(
     first_x : ndarray, shape (n,)
         Filled: p a at the start with the covariance ``first_p`` of the start, negative: correction of the start.
     """
-    for e in range(end - 1, begin - 1, -1):
+    for e in range(end - 1, -1, -1):
+        is_spread, row = e >= spread_from, solved.row[e]
         for m in range(schedule.seen[e + 1] - 1, schedule.seen[e] - 1, -1):
             for i in range(2, -1, -1):
                 if solved.mark[3 * m + i] == 1:
-                    back_over_scalar(3 * m + i, linear, solved, a, A, u, own)
-        for i in range(KEPT_ROWS):
+                    if is_spread:
+                        spread_over_scalar(3 * m + i, linear, solved, A, u)
+                    adjoint_over_scalar(3 * m + i, linear, solved, a)
+        for i in range(KEPT_ROWS if row >= 0 else 0):
             total, spread, beside = 0.0, 0.0, 0.0
             for j in range(STATES):
-                total += solved.p[e, i, j] * a[j]
+                total += solved.p[row, i, j] * a[j]
             x[e, i] = -total
+            if not is_spread:
+                continue
             if i >= NAVIGATION and e % seldom != 0 and e < end - 1:  # biases walk slowly
                 variance[e, i] = variance[e + 1, i]
                 continue
+            fill_product(A, solved.p[row, i], u)
             for j in range(STATES):
-                u[j] = 0.0
-            for r in range(STATES):  # u = A p
-                value = solved.p[e, i, r]
-                if value != 0.0:
-                    for j in range(STATES):
-                        u[j] += value * A[r, j]
-            for j in range(STATES):
-                spread += solved.p[e, i, j] * u[j]
-            variance[e, i] = solved.p[e, i, i] - spread
+                spread += solved.p[row, i, j] * u[j]
+            variance[e, i] = solved.p[row, i, i] - spread
             if i in (1, ATT + 1):
                 for j in range(STATES):
-                    beside += solved.p[e, i - 1, j] * u[j]
-                plane[e, 0 if i == 1 else 1] = solved.p[e, i - 1, i] - beside
-        back_over_step(e, pattern, linear, a, A, w, u)
+                    beside += solved.p[row, i - 1, j] * u[j]
+                plane[e, 0 if i == 1 else 1] = solved.p[row, i - 1, i] - beside
+        if is_spread:
+            spread_over_step(e, pattern, linear, A, w)
+        adjoint_over_step(e, pattern, linear, a, u)
     for i in range(STATES):
         total = 0.0
         for j in range(STATES):

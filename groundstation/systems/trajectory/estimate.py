@@ -11,6 +11,7 @@ import numpy as np
 from groundstation.base.angles import wrap_180, wrap_360
 from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import NotAssessableError
+from groundstation.base.halves import two_at_once
 from groundstation.systems.trajectory import observations, slip, still
 from groundstation.systems.trajectory.fit import NUMBERS, Fit, Number, Scores, fit_model
 from groundstation.systems.trajectory.fix_motion import motion_of
@@ -195,23 +196,26 @@ def hypotheses_of(problem: Problem, model: Model, rules: Gate) -> tuple[Hypothes
     )
     early = int(np.searchsorted(plan.epoch_s, _first_motion_s(problem.gnss, plan.epoch_s[0]) + PRUNE_S))
     early = min(early, len(plan.epoch_s))
-    room = linear_room(plan)
 
     def run(begin: int, end: int, now: Now, work: Room) -> float:
+        """Filter a span of epochs; what it is linearised by is not kept."""
+        room = linear_room(plan)
         return filter_epochs(
             problem.samples, plan, noise, rules, OWN_ESTIMATE, (begin, end), now, work, room, nothing_kept()
         )
 
-    runs = []
-    for start in starts:
+    def begun(start: Start) -> tuple[float, Start, Now, Room]:
         now, work = start.now(), make_room(start.prior)
-        runs.append((run(0, early, now, work), start, now, work))
+        return run(0, early, now, work), start, now, work
+
+    def ended(one: tuple[float, Start, Now, Room]) -> Hypothesis:
+        value, start, now, work = one
+        total = value + run(early, len(plan.epoch_s), now, work)
+        return Hypothesis(heading_of(start.nav), heading_of(now.nav), total, start)
+
+    runs = two_at_once(begun, starts)
     best = max(value for value, *_ in runs)
-    found = []
-    for value, start, now, work in runs:
-        if value >= best - PRUNE_BELOW:
-            total = value + run(early, len(plan.epoch_s), now, work)
-            found.append(Hypothesis(heading_of(start.nav), heading_of(now.nav), total, start))
+    found = two_at_once(ended, [one for one in runs if one[0] >= best - PRUNE_BELOW])
     found.sort(key=lambda one: -one.likelihood)
     kept: list[Hypothesis] = []
     for one in found:
@@ -232,11 +236,12 @@ def _first_motion_s(gnss: GnssFixes, begin_s: float) -> float:
     return float(moving[0]) if len(moving) else begin_s
 
 
-def settle(problem: Problem, model: Model, rules: Gate, start: Start, rounds: int) -> tuple[Problem, Start, Pass]:
+def settle(problem: Problem, model: Model, rules: Gate, start: Start, rounds: int) -> tuple[Problem, Start]:
     """Run passes until the latency stands; each begins where the one before was smoothed to."""
     for _ in range(rounds):
         plan = problem.plan(model)
-        done = run_pass(problem.samples, plan, problem.noise(model), rules, start)
+        first = np.arange(len(plan.epoch_s)) == 0
+        done = run_pass(problem.samples, plan, problem.noise(model), rules, start, wanted=first, has_sigmas=False)
         late, lag = float(done.constants[LAT]), float(done.constants[LAG])
         late = float(np.clip(problem.latency_s + late, -MOST_LATENCY_S, MOST_LATENCY_S)) - problem.latency_s
         start = done.start
@@ -249,11 +254,15 @@ def settle(problem: Problem, model: Model, rules: Gate, start: Start, rounds: in
         turned_rad = float(np.linalg.norm(done.x[0, ATT : ATT + 3]))
         if max(abs(late), abs(lag)) < LATENCY_ENOUGH_S and turned_rad < SETTLED_RAD:
             break
-    return problem, start, done
+    return problem, start
 
 
-def relinearised(problem: Problem, model: Model, rules: Gate, done: Pass, rounds: int = LINE_ROUNDS) -> Pass:
+def relinearised(
+    problem: Problem, model: Model, rules: Gate, done: Pass, rounds: int = LINE_ROUNDS, *, has_sigmas: bool = True
+) -> Pass:
     """Run passes that are linearised about the smoothed trajectory of the one before.
+
+    The last of them has sigmas, where they are wanted.
 
     A filter that is linearised about its own estimate thinks that it sees what it cannot: as the estimate moves, the
     combination of errors that no datum shows moves too.
@@ -262,10 +271,10 @@ def relinearised(problem: Problem, model: Model, rules: Gate, done: Pass, rounds
     G. P. Huang, A. I. Mourikis, S. I. Roumeliotis, Observability-based rules for consistent EKF SLAM, 2010.
     """
     plan, noise = problem.plan(model), problem.noise(model)
-    for _ in range(rounds):
+    for left in range(rounds - 1, -1, -1):
         line = line_of(done)
         start = problem.restarted(at_line(done.start, line), model)
-        done = run_pass(problem.samples, plan, noise, rules, start, line)
+        done = run_pass(problem.samples, plan, noise, rules, start, line, has_sigmas=has_sigmas and not left)
     return done
 
 
@@ -341,14 +350,14 @@ def estimate(
         problem = replace(problem, sigmas=sigmas)
     open_gate, rules = gate(OPEN_SIGMAS), gate(CLOSED_SIGMAS)
     first = hypotheses_of(problem, model, open_gate)
-    problem, start, done = settle(problem, model, open_gate, first[0].start, LATENCY_ROUNDS)
+    problem, start = settle(problem, model, open_gate, first[0].start, LATENCY_ROUNDS)
     _, done = _at(problem, model, rules, start)
     found = Fit(model, done.likelihood, 0, ())
     if fit:
-        done = relinearised(problem, model, rules, done)
+        done = relinearised(problem, model, rules, done, has_sigmas=False)
         found = fitted(problem, model, done)
         model = found.model
-    problem, start, done = settle(problem, model, rules, problem.restarted(start, model), SETTLE_ROUNDS)
+    problem, start = settle(problem, model, rules, problem.restarted(start, model), SETTLE_ROUNDS)
     start, done = _at(problem, model, rules, start)
     track = smoothed_track(problem.samples, done)
     travel = slip.direction_of_travel(track)
@@ -360,7 +369,7 @@ def estimate(
         start = replace(start, value=value)
         start, done = _at(problem, model, rules, problem.restarted(start, model))
         if fit:
-            done = relinearised(problem, model, rules, done)
+            done = relinearised(problem, model, rules, done, has_sigmas=False)
             found = fitted(problem, model, done, SLIP)
             model = found.model
             start, done = _at(problem, model, rules, problem.restarted(start, model))
@@ -379,6 +388,6 @@ def without_slip(problem: Problem) -> Problem:
 
 
 def _at(problem: Problem, model: Model, rules: Gate, start: Start) -> tuple[Start, Pass]:
-    """Run one pass at the latency that stands."""
-    done = run_pass(problem.samples, problem.plan(model), problem.noise(model), rules, start)
+    """Run one pass at the latency that stands, without sigmas."""
+    done = run_pass(problem.samples, problem.plan(model), problem.noise(model), rules, start, has_sigmas=False)
     return done.start, done

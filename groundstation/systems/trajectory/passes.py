@@ -4,6 +4,7 @@ import numpy as np
 
 from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import curvature_radii_m
+from groundstation.base.records import BoolArray
 from groundstation.systems.trajectory.backward import run_backward
 from groundstation.systems.trajectory.forward import BLOCK, run_forward
 from groundstation.systems.trajectory.layout import Plan, Samples
@@ -76,6 +77,7 @@ def nothing_kept() -> Solved:
     none = np.zeros(0)
     return Solved(
         np.zeros((0, KEPT_ROWS, STATES)),
+        np.zeros(0, dtype=np.int64),
         wide,
         wide,
         wide,
@@ -87,11 +89,12 @@ def nothing_kept() -> Solved:
     )
 
 
-def all_kept(plan: Plan) -> Solved:
-    """Return room for the history of a pass that is smoothed."""
+def history_of(plan: Plan, is_smoothed: BoolArray) -> Solved:
+    """Return room for the history of a pass whose epochs are smoothed, or some of them."""
     epochs, scalars = len(plan.epoch_s), 3 * len(plan.seen.kind)
     return Solved(
-        np.empty((epochs, KEPT_ROWS, STATES)),
+        np.empty((int(is_smoothed.sum()), KEPT_ROWS, STATES)),
+        np.where(is_smoothed, np.cumsum(is_smoothed) - 1, -1),
         np.empty((epochs, STATES)),
         np.empty((epochs, STATES)),
         np.empty((epochs, STATES)),
@@ -131,7 +134,8 @@ class Pass:
     linear, solved
         Linearisation and history of the filter.
     x, variance : ndarrays, shape (e, KEPT_ROWS)
-        Smoothed correction to the estimate before the measurements of each epoch, and its variance.
+        Smoothed correction to the estimate before the measurements of each epoch, and its variance; NaN where it was
+        not wanted.
     plane : ndarray, shape (e, 2)
         Covariances of north with east: of the smoothed position, and of the smoothed attitude.
     before_variance : ndarray, shape (e, NAVIGATION)
@@ -204,6 +208,8 @@ def run_pass(
     line: Line = OWN_ESTIMATE,
     known: Linear | None = None,
     *,
+    wanted: BoolArray | None = None,
+    has_sigmas: bool = True,
     keeps_all: bool = False,
 ) -> Pass:
     """Filter forward over all epochs and smooth back.
@@ -214,30 +220,33 @@ def run_pass(
         Trajectory that it is linearised about; its own estimate where there is none.
     known : Linear, optional
         Linearisation about ``line`` from an earlier pass with the same epochs: only the solving is left.
+    wanted : ndarray of bool, shape (e,), optional
+        Epochs that are smoothed, all by default; NaN at others. The start and the constants are always smoothed.
+    has_sigmas : bool
+        False: no variance is smoothed, which is most of the work of the way back.
     keeps_all : bool
         Covariances and gains of the filter stay in ``solved``; they are most of the memory.
     """
-    epochs = len(plan.epoch_s)
+    epochs, seldom = len(plan.epoch_s), 1 if keeps_all else SELDOM
     linear = linear_room(plan) if known is None else known
-    solved = all_kept(plan)
+    smoothed = np.ones(epochs, dtype=bool) if wanted is None else _with_groups(wanted, seldom)
+    solved = history_of(plan, smoothed)
     now, room = start.now(), make_room(start.prior)
     likelihood = filter_epochs(samples, plan, noise, gate, line, (0, epochs), now, room, linear, solved, known is None)
-    x, variance = np.zeros((epochs, KEPT_ROWS)), np.zeros((epochs, KEPT_ROWS))
-    plane = np.zeros((epochs, 2))
+    x, variance, before_variance = (np.full((epochs, width), np.nan) for width in (KEPT_ROWS, KEPT_ROWS, NAVIGATION))
+    plane = np.full((epochs, 2), np.nan)
     first, square = np.zeros(STATES), [np.zeros((STATES, STATES)) for _ in range(2)]
     run_backward(
         plan.schedule,
         PATTERN,
         linear,
         solved,
-        0,
         epochs,
-        1 if keeps_all else SELDOM,
+        int(np.argmax(smoothed)) if has_sigmas and smoothed.any() else epochs,
+        seldom,
         np.zeros(STATES),
-        square[0],
-        square[1],
+        *square,
         np.zeros(STATES),
-        np.zeros(2),
         x,
         variance,
         plane,
@@ -245,7 +254,7 @@ def run_pass(
         start.p,
     )
     x += solved.before[:, :KEPT_ROWS]
-    before_variance = np.diagonal(solved.p[:, :NAVIGATION, :NAVIGATION], axis1=1, axis2=2).copy()
+    before_variance[smoothed] = np.diagonal(solved.p[:, :NAVIGATION, :NAVIGATION], axis1=1, axis2=2)
     if not keeps_all:
         solved = solved._replace(p=solved.p[:0].copy(), K=solved.K[:0].copy())
     constants = linear.value[-1] + solved.after[-1]
@@ -264,6 +273,12 @@ def run_pass(
         start,
         moved(start, begun),
     )
+
+
+def _with_groups(wanted: BoolArray, seldom: int) -> BoolArray:
+    """Return the epochs that are wanted, and those behind them up to where variances of the biases are smoothed."""
+    group = -(-np.arange(len(wanted)) // seldom)
+    return np.asarray(np.isin(group, group[wanted]))
 
 
 def moved(start: Start, correction: FloatArray) -> Start:

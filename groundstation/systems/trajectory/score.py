@@ -13,8 +13,14 @@ import numpy as np
 
 from groundstation.base.compile import in_place
 from groundstation.base.dataclasses import dataclass
+from groundstation.base.halves import both
 from groundstation.methods.kalman.arrays import Pattern
-from groundstation.systems.trajectory.backward import back_over_scalar, back_over_step
+from groundstation.systems.trajectory.backward import (
+    adjoint_over_scalar,
+    adjoint_over_step,
+    spread_over_scalar,
+    spread_over_step,
+)
 from groundstation.systems.trajectory.forward import BLOCK
 from groundstation.systems.trajectory.layout import Plan, Samples
 from groundstation.systems.trajectory.passes import (
@@ -56,7 +62,6 @@ def run_score(
     A: FloatArray,
     w: FloatArray,
     u: FloatArray,
-    own: FloatArray,
     by_scalar: FloatArray,
     by_noise: FloatArray,
 ) -> None:
@@ -66,7 +71,7 @@ def run_score(
     ----------
     a, A : ndarrays, shapes (n,), (n, n)
         Zero at the end of the data; changed in place: the adjoint of the start.
-    w, u, own : ndarrays, shapes (n, n), (n,), (2,)
+    w, u : ndarrays, shapes (n, n), (n,)
         Room.
     by_scalar : ndarray, shape (2, s)
         Zeros; filled for the variances of the scalars used: squares of the adjoint, and its covariance.
@@ -78,8 +83,9 @@ def run_score(
             for i in range(2, -1, -1):
                 at = 3 * m + i
                 if solved.mark[at] == 1:
-                    back_over_scalar(at, linear, solved, a, A, u, own)
-                    by_scalar[0, at], by_scalar[1, at] = own[0], own[1]
+                    by_scalar[1, at] = spread_over_scalar(at, linear, solved, A, u)
+                    own = adjoint_over_scalar(at, linear, solved, a)
+                    by_scalar[0, at] = own * own
         time_s = linear.spent[e, 0]
         for side in range(2):
             into = by_noise[side]
@@ -96,7 +102,8 @@ def run_score(
             for i in range(VARIANCES):
                 decay = linear.F[e, BLOCK + i]
                 into[DENSITIES + i] += u[BARO if i == 6 else SLOW + i] * (1.0 - decay * decay)
-        back_over_step(e, pattern, linear, a, A, w, u)
+        spread_over_step(e, pattern, linear, A, w)
+        adjoint_over_step(e, pattern, linear, a, u)
 
 
 @dataclass(frozen=True)
@@ -144,21 +151,35 @@ def score_of(
     at : ndarray, shape (n,)
     """
     of = variances(at)
-    value, solved = solved_with(samples, plan, gate, known, end, of)
-    a, A, own, w, u = (np.zeros(shape) for shape in (STATES, (STATES, STATES), 2, (STATES, STATES), STATES))
+    a, A, w, u = (np.zeros(shape) for shape in (STATES, (STATES, STATES), (STATES, STATES), STATES))
     by_scalar, by_noise = np.zeros((2, of.seen.size)), np.zeros((2, DENSITIES + VARIANCES))
-    run_score(plan.schedule, PATTERN, known, solved, end, a, A, w, u, own, by_scalar, by_noise)
+    by_number: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+
+    def go() -> float:
+        value, solved = solved_with(samples, plan, gate, known, end, of)
+        run_score(plan.schedule, PATTERN, known, solved, end, a, A, w, u, by_scalar, by_noise)
+        return value
+
+    def differ() -> None:
+        by_number.extend(_differences(variances, at, one) for one in range(len(at)))
+
+    value = both(go, differ)
     by_start = np.stack([a * a, np.diagonal(A)])
-    sides = np.empty((len(at), 2))
-    for i in range(len(at)):
-        step = np.zeros(len(at))
-        step[i] = STEP
-        up, down = variances(at + step), variances(at - step)
-        noise = np.concatenate([up.noise.density - down.noise.density, up.noise.variance - down.noise.variance])
-        seen = np.nan_to_num(up.seen - down.seen).ravel()
-        start = np.diagonal(up.start.p - down.start.p)
-        sides[i] = (by_noise @ noise + by_scalar @ seen + by_start @ start) / (4.0 * STEP)
+    sides = np.array(
+        [(by_noise @ noise + by_scalar @ seen + by_start @ start) / (4.0 * STEP) for noise, seen, start in by_number]
+    ).reshape(-1, 2)
     return Scored(value, sides[:, 0] - sides[:, 1], sides[:, 1])
+
+
+def _differences(
+    variances: Callable[[FloatArray], Variances], at: FloatArray, number: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return by how much the variances of noise, measurements and start change over two steps of one number."""
+    step = np.zeros(len(at))
+    step[number] = STEP
+    up, down = variances(at + step), variances(at - step)
+    noise = np.concatenate([up.noise.density - down.noise.density, up.noise.variance - down.noise.variance])
+    return noise, np.nan_to_num(up.seen - down.seen).ravel(), np.diagonal(up.start.p - down.start.p)
 
 
 def solved_with(

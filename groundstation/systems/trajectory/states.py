@@ -170,7 +170,8 @@ class Linear(NamedTuple):
 class Solved(NamedTuple):
     """History of the filter; arrays without length are not kept."""
 
-    p: FloatArray  # (e, KEPT_ROWS, STATES) before the measurements
+    p: FloatArray  # (rows, KEPT_ROWS, STATES) before the measurements of the epochs that are smoothed
+    row: Int64Array  # (e,) row of ``p`` for each epoch, -1: not kept
     before: FloatArray  # (e, STATES) correction before the measurements of each epoch
     after: FloatArray  # (e, STATES) and after them
     variance: FloatArray  # (e, STATES) after the measurements

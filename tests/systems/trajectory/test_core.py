@@ -186,6 +186,22 @@ def short_problem(family: Family, epochs: int, *, with_line: bool = False) -> tu
     return done, seen, p
 
 
+def test_only_what_is_wanted_is_smoothed_and_to_the_same_numbers() -> None:
+    short, _seen, p = short_problem("uav", 24)
+    begun = replace(short.begun, p=p)
+    of = samples_of(simulate_imu("uav", 5, settings=ImuSettings(duration_s=100.0, scale_factor=0.005))), short.plan
+    whole = run_pass(*of, NOISE, gate(1e6), begun)
+    wanted = np.isin(np.arange(24), (7, 8, 9, 17))
+    part = run_pass(*of, NOISE, gate(1e6), begun, wanted=wanted)
+    for name in ("x", "variance", "plane", "before_variance"):
+        assert np.array_equal(getattr(part, name)[wanted], getattr(whole, name)[wanted])
+        assert np.isnan(getattr(part, name)[[0, 5, 11, 15, 21, 23]]).all()
+    plain = run_pass(*of, NOISE, gate(1e6), begun, has_sigmas=False)
+    assert np.array_equal(plain.x, whole.x) and np.isnan(plain.variance).all()
+    for one in (part, plain):
+        assert np.array_equal(one.start.value, whole.start.value) and np.array_equal(one.constants, whole.constants)
+
+
 def process_noise(done: Pass, epoch: int) -> FloatArray:
     """Covariance that an epoch adds, from the densities of the model."""
     Q = np.zeros((STATES, STATES))
