@@ -9,30 +9,29 @@ import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from itertools import chain
 from os import SEEK_END
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.failures import CODE, Failure, attempt, with_failures
-from groundstation.base.printable import csv_cell, printable_json
+from groundstation.base.printable import printable_json
 from groundstation.base.serial import MismatchError, from_json, to_json, to_json_exactly
 from groundstation.base.to_disk import sync_file
 from groundstation.results.answer import Answer
 from groundstation.results.arrays.typed import T
 from groundstation.results.chosen import chosen_intervals
+from groundstation.results.csv_table import csv_text as csv_text
 from groundstation.results.document import SummaryDocument
 from groundstation.results.figures import FigureData, FigureSet
 from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
 from groundstation.results.flight import FlightResults
 from groundstation.results.manifest import Manifest
 from groundstation.results.restore import restored
-from groundstation.results.summary import digits_of, summary_of
+from groundstation.results.summary import summary_of
 
 Document = TypeVar("Document")
 OLD_COLUMNS: Mapping[str, Mapping[str, str]] = {  # names of an earlier version, still read
@@ -352,41 +351,6 @@ def _read_parquet(path: Path) -> FigureData:
 def utf8_text(text: Any) -> str:
     """Return text as Parquet takes it: a lone surrogate becomes its escape."""
     return str(text).encode("utf-8", "backslashreplace").decode("utf-8")
-
-
-def csv_text(figure: FigureData, line_end: str = "\n") -> str:
-    """Return a figure's arrays as readable CSV: rounded, NaN empty.
-
-    No cell holds what a spreadsheet would run as a formula.
-    """
-    forms, cells = [], []
-    for name, values in figure.columns.items():
-        form, column = _csv_column(values, figure.digits.get(name, digits_of(name)))
-        forms.append(form)
-        cells.append(column)
-    head = ",".join(csv_cell(name) for name in figure.columns)
-    row = line_end + ",".join(forms)
-    rows = len(cells[0]) if cells else 0
-    return head + row * rows % tuple(chain.from_iterable(zip(*cells, strict=True))) + line_end
-
-
-def _csv_column(values: NDArray[Any], places: int) -> tuple[str, list[Any]]:
-    """Return the form of a cell and what goes into it.
-
-    All cells of a table are written in one go.
-    """
-    kind = values.dtype.kind
-    if kind == "f":
-        rounded = np.round(values.astype(np.float64), places) + 0.0
-        form, numbers, is_known = f"%.{places}f", rounded.tolist(), np.isfinite(rounded)
-        if is_known.all():
-            return form, numbers
-        return "%s", [form % one if known else "" for one, known in zip(numbers, is_known.tolist(), strict=True)]
-    if kind in "biu":
-        return "%d", values.tolist()
-    texts = list(map(str, values.tolist()))
-    cell_of = {text: csv_cell(text) for text in set(texts)}  # few, each many times
-    return "%s", [cell_of[text] for text in texts]
 
 
 def parquet_bytes(table: Any) -> bytes:
