@@ -42,7 +42,10 @@ def csv_text(figure: FigureData, line_end: str = "\n") -> str:
 
 
 def short_rows(columns: Sequence[Column], line_end: str) -> str:
-    """Write the rows of a table, a cell at a time: ``line_end`` before each row, a comma between cells."""
+    """Write the rows of a table, a cell at a time.
+
+    ``line_end`` stands before each row, a comma between cells.
+    """
     forms, cells = [], []
     for values, places in columns:
         form, column = _cells(values, places)
@@ -158,7 +161,10 @@ def _decimals(numbers: Integers, is_negative: NDArray[np.bool_] | None, places: 
 
 
 def _groups(numbers: Integers, digits: int, *, is_filled: bool = False) -> Iterator[Words]:
-    """Write whole numbers of at most so many digits, without the zeros in front or filled up with them."""
+    """Write whole numbers of at most so many digits.
+
+    The zeros in front are left out, or fill the number up.
+    """
     power = _POWER ** ((digits - 1) // _DIGITS)
     is_begun: NDArray[np.bool_] | bool = is_filled
     while power > 1:
