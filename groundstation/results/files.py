@@ -7,6 +7,7 @@ import io
 import json
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
 from os import SEEK_END
@@ -137,14 +138,22 @@ def write_bytes(path: Path, content: bytes, *, is_synced: bool = True) -> None:
     """
     temporary = path.with_name(f".{path.name}.partial")
     try:
-        temporary.write_bytes(content)
-        if is_synced:
-            sync_file(temporary)
-        temporary.replace(path)
-    except OSError as error:  # a full disk does not say which file
-        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+        with _named_in_errors(path):
+            temporary.write_bytes(content)
+            if is_synced:
+                sync_file(temporary)
+            temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def _named_in_errors(path: Path) -> Iterator[None]:
+    """Name a file in the errors of the system: a full disk does not say which file it is."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
 
 
 def json_text(document: Any) -> str:
@@ -182,7 +191,9 @@ def _save_figure(folder: Path, figure: FigureData) -> None:
     text = csv_text(figure) if figure.is_copied else ""
     _write_parquet(folder / ARRAYS / f"{figure.name}.parquet", figure)
     if text:
-        write_text(folder / TABLES / f"{figure.name}.csv", text, is_synced=False)
+        path = folder / TABLES / f"{figure.name}.csv"
+        with _named_in_errors(path):  # in place, like the arrays: without the summary the folder is not finished
+            path.write_bytes(_encoded(text))
 
 
 def put_failures(folder: Path, found: Sequence[Failure], made_again: Sequence[str] = ()) -> bool:
@@ -317,7 +328,7 @@ def _write_parquet(path: Path, figure: FigureData) -> None:
     }
     digits = {name: str(figure.digits[name]) for name in figure.digits}
     table = pa.table(arrays).replace_schema_metadata({"digits": json.dumps(digits, sort_keys=True)})
-    pq.write_table(table, path, compression="zstd")
+    pq.write_table(table, path, compression="zstd", use_dictionary=False)  # of numbers they take time and room
 
 
 def _arrow_texts(values: Sequence[Any]) -> Any:
