@@ -11,6 +11,7 @@ from functools import cache
 JOINERS = "\u200c\u200d"  # some scripts need them; they hide nothing
 FORMULA_STARTS = ("=", "+", "-", "@", "＝", "＋", "－", "＠")
 _OTHERS = re.compile("[^\x20-\x7e]")  # than what shows in any program
+_OTHERS_IN_JSON = re.compile("[^\n\x20-\x7e]")  # a line end stands between its parts; within a text it is an escape
 
 
 @cache
@@ -89,12 +90,12 @@ def printable_json(text: str) -> str:
     >>> print(printable_json('["a\\u202eb", "\\x7f", "ж"]'))
     ["a\\u202eb", "\\u007f", "ж"]
     """
-    return _OTHERS.sub(_escaped, text)
+    return _OTHERS_IN_JSON.sub(_escaped, text)
 
 
 def _escaped(match: re.Match[str]) -> str:
     mark = match[0]
-    if mark == "\n" or not is_hidden(mark):  # between the parts of a document; within a text it is an escape
+    if not is_hidden(mark):
         return mark
     units = mark.encode("utf-16-be", "surrogatepass")
     return "".join(f"\\u{units[at]:02x}{units[at + 1]:02x}" for at in range(0, len(units), 2))

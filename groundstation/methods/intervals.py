@@ -103,23 +103,41 @@ def slope_through_origin(hours: FloatArray, error: FloatArray, weight: FloatArra
 
 
 BOUND95 = 1.959963984540054  # standard errors, of the normal distribution
+DENSITY_AT_MEAN = 0.3989422804014327  # of the standard normal distribution
+MOST_STEPS, SMALLEST_STEP = 120, 1e-14  # of the search of a quantile; in sigmas of the whole
 
 
 def mixture_quantile(probability: float, mean: FloatArray, sigma: FloatArray, weight: FloatArray) -> float:
-    """Quantile of a mixture of normal distributions, by bisection.
+    """Quantile of a mixture of normal distributions, by Newton's method between bounds.
+
+    The bounds close in with every step. Where a step leaves them, or is not half as long as the one before the last,
+    the middle between them is next: there are never many more steps than bisection takes, and seldom more than eight.
+
+    Source: W. Press et al., Numerical Recipes, third edition, 2007, section 9.4 (rtsafe).
 
     Examples
     --------
     >>> round(mixture_quantile(0.975, np.zeros(2), np.array([1.0, 1.0]), np.array([0.3, 0.7])), 3)
     1.96
     """
-    from scipy.special import ndtr
+    from scipy.special import ndtr, ndtri
 
     low, high = float(np.min(mean - 12.0 * sigma)), float(np.max(mean + 12.0 * sigma))
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if float(weight @ ndtr((middle - mean) / sigma)) < probability:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
+    middle = float(weight @ mean)
+    spread = float(np.sqrt(weight @ (sigma**2 + (mean - middle) ** 2)))
+    at = min(max(middle + spread * float(ndtri(probability)), low), high)
+    steps = (high - low, high - low)
+    for _ in range(MOST_STEPS):
+        apart = (at - mean) / sigma
+        missing = probability - float(weight @ ndtr(apart))
+        low, high = (at, high) if missing > 0.0 else (low, at)
+        density = float(weight @ (np.exp(-0.5 * apart * apart) / sigma)) * DENSITY_AT_MEAN
+        step = missing / density if density > 0.0 else np.inf
+        if abs(step) <= SMALLEST_STEP * spread:
+            return at + step
+        if not low < at + step < high or abs(step) > 0.5 * abs(steps[0]):
+            step = 0.5 * (low + high) - at
+            if step in (low - at, high - at):  # no number lies between
+                return at
+        at, steps = at + step, (steps[1], step)
+    return at

@@ -7,32 +7,32 @@ import io
 import json
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
-from itertools import chain
 from os import SEEK_END
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.failures import CODE, Failure, attempt, with_failures
-from groundstation.base.printable import csv_cell, printable_json
+from groundstation.base.printable import printable_json
 from groundstation.base.serial import MismatchError, from_json, to_json, to_json_exactly
 from groundstation.base.to_disk import sync_file
 from groundstation.results.answer import Answer
 from groundstation.results.arrays.typed import T
 from groundstation.results.chosen import chosen_intervals
+from groundstation.results.csv_table import csv_text as csv_text
 from groundstation.results.document import SummaryDocument
 from groundstation.results.figures import FigureData, FigureSet
 from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
 from groundstation.results.flight import FlightResults
 from groundstation.results.manifest import Manifest
 from groundstation.results.restore import restored
-from groundstation.results.summary import digits_of, summary_of
+from groundstation.results.summary import summary_of
 
 Document = TypeVar("Document")
 OLD_COLUMNS: Mapping[str, Mapping[str, str]] = {  # names of an earlier version, still read
@@ -138,14 +138,22 @@ def write_bytes(path: Path, content: bytes, *, is_synced: bool = True) -> None:
     """
     temporary = path.with_name(f".{path.name}.partial")
     try:
-        temporary.write_bytes(content)
-        if is_synced:
-            sync_file(temporary)
-        temporary.replace(path)
-    except OSError as error:  # a full disk does not say which file
-        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+        with _named_in_errors(path):
+            temporary.write_bytes(content)
+            if is_synced:
+                sync_file(temporary)
+            temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def _named_in_errors(path: Path) -> Iterator[None]:
+    """Name a file in the errors of the system: a full disk does not say which file it is."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
 
 
 def json_text(document: Any) -> str:
@@ -183,7 +191,9 @@ def _save_figure(folder: Path, figure: FigureData) -> None:
     text = csv_text(figure) if figure.is_copied else ""
     _write_parquet(folder / ARRAYS / f"{figure.name}.parquet", figure)
     if text:
-        write_text(folder / TABLES / f"{figure.name}.csv", text, is_synced=False)
+        path = folder / TABLES / f"{figure.name}.csv"
+        with _named_in_errors(path):  # in place, like the arrays: without the summary the folder is not finished
+            path.write_bytes(_encoded(text))
 
 
 def put_failures(folder: Path, found: Sequence[Failure], made_again: Sequence[str] = ()) -> bool:
@@ -318,7 +328,7 @@ def _write_parquet(path: Path, figure: FigureData) -> None:
     }
     digits = {name: str(figure.digits[name]) for name in figure.digits}
     table = pa.table(arrays).replace_schema_metadata({"digits": json.dumps(digits, sort_keys=True)})
-    pq.write_table(table, path, compression="zstd")
+    pq.write_table(table, path, compression="zstd", use_dictionary=False)  # of numbers they take time and room
 
 
 def _arrow_texts(values: Sequence[Any]) -> Any:
@@ -352,41 +362,6 @@ def _read_parquet(path: Path) -> FigureData:
 def utf8_text(text: Any) -> str:
     """Return text as Parquet takes it: a lone surrogate becomes its escape."""
     return str(text).encode("utf-8", "backslashreplace").decode("utf-8")
-
-
-def csv_text(figure: FigureData, line_end: str = "\n") -> str:
-    """Return a figure's arrays as readable CSV: rounded, NaN empty.
-
-    No cell holds what a spreadsheet would run as a formula.
-    """
-    forms, cells = [], []
-    for name, values in figure.columns.items():
-        form, column = _csv_column(values, figure.digits.get(name, digits_of(name)))
-        forms.append(form)
-        cells.append(column)
-    head = ",".join(csv_cell(name) for name in figure.columns)
-    row = line_end + ",".join(forms)
-    rows = len(cells[0]) if cells else 0
-    return head + row * rows % tuple(chain.from_iterable(zip(*cells, strict=True))) + line_end
-
-
-def _csv_column(values: NDArray[Any], places: int) -> tuple[str, list[Any]]:
-    """Return the form of a cell and what goes into it.
-
-    All cells of a table are written in one go.
-    """
-    kind = values.dtype.kind
-    if kind == "f":
-        rounded = np.round(values.astype(np.float64), places) + 0.0
-        form, numbers, is_known = f"%.{places}f", rounded.tolist(), np.isfinite(rounded)
-        if is_known.all():
-            return form, numbers
-        return "%s", [form % one if known else "" for one, known in zip(numbers, is_known.tolist(), strict=True)]
-    if kind in "biu":
-        return "%d", values.tolist()
-    texts = list(map(str, values.tolist()))
-    cell_of = {text: csv_cell(text) for text in set(texts)}  # few, each many times
-    return "%s", [cell_of[text] for text in texts]
 
 
 def parquet_bytes(table: Any) -> bytes:

@@ -241,6 +241,26 @@ def test_mixture_quantile_of_unequal_normals() -> None:
     assert float(weight @ norm.cdf((quantile - mean) / sigma)) == pytest.approx(0.9, abs=1e-9)
 
 
+@pytest.mark.parametrize("kind", ["alike", "far apart", "of all sizes"])
+def test_quantiles_of_many_normals_are_found_in_few_steps(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An interval asks for quantiles of thousands of draws: bisection took 60 passes over them."""
+    import scipy.special
+
+    passes, ndtr = [], scipy.special.ndtr
+    monkeypatch.setattr(scipy.special, "ndtr", lambda values: (passes.append(1), ndtr(values))[1])
+    rng = np.random.default_rng(7)
+    mean, sigma, weight = rng.normal(0.3, 0.02, 3000), np.exp(rng.normal(-3.0, 0.3, 3000)), rng.dirichlet(np.ones(3000))
+    if kind == "far apart":
+        mean = np.where(rng.random(3000) < 0.5, -40.0, 40.0)
+    if kind == "of all sizes":
+        sigma = np.exp(rng.normal(-3.0, 4.0, 3000))
+    for probability in (1e-6, 0.025, 0.5, 0.975):
+        passes.clear()
+        quantile = mixture_quantile(probability, mean, sigma, weight)
+        assert float(weight @ ndtr((quantile - mean) / sigma)) == pytest.approx(probability, abs=1e-12)
+        assert len(passes) <= (12 if kind == "alike" else 62)
+
+
 def test_priors_are_broader_than_the_family() -> None:
     """Two sigma of every prior reach beyond what docs/evidence/heading.md draws."""
     family = {
