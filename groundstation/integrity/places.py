@@ -20,7 +20,7 @@ from groundstation.integrity.counting import is_frozen
 from groundstation.integrity.ordering import joined_columns
 from groundstation.integrity.time_passes import MANY_LAID, lay, passes_over
 
-MEMORY_BYTES = 16 << 20  # when there are more, all go to a file
+MEMORY_BYTES = 24 << 20  # when there are more, all go to a file
 WINDOW_RECORDS = 500_000  # at least so many records of all topics are laid in order at a time
 
 

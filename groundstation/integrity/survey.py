@@ -1,7 +1,7 @@
 """One pass over a log: its header, clock model and ledger.
 
 Kept are places and times, 16 bytes a record, for each set of topics that are sampled together; when there are more than
-16 MiB of them, all go to a temporary file, 12 bytes a record; times of validity take 8 bytes more. Rates and gaps are
+24 MiB of them, all go to a temporary file, 12 bytes a record; times of validity take 8 bytes more. Rates and gaps are
 those of the times at which values were valid.
 """
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from groundstation.base.dataclasses import dataclass
 from groundstation.base.gaps import Gaps, Pause
+from groundstation.base.garbage import give_back
 from groundstation.base.records import Damage, Int64Array, Item, LogHeader, NewLog, RecordBatch, Remark
 from groundstation.integrity.breaks_off import broken_off
 from groundstation.integrity.clock import ClockModel
@@ -28,6 +29,8 @@ from groundstation.integrity.places import PieceOnDisk, Places
 from groundstation.integrity.rhythm import rhythm_of
 from groundstation.integrity.source_clock import ClockPass, PowerUpClock, clock_of
 from groundstation.integrity.steps_by_source import StepsBySource
+
+MANY_RECORDS = 4_000_000  # from which the times of a topic may take more memory than anything before
 
 
 @dataclass(frozen=True)
@@ -150,6 +153,8 @@ def _surveyed(items: Iterable[Item], places: Places, limits: Thresholds) -> Surv
             new_logs.append(item)
         else:
             header = item
+    if places.records > MANY_RECORDS:
+        give_back()
     clock, parts = clock_of(ClockPass(header, tuple(new_logs), places, pieces, references), limits)
     clock = replace(clock, relations=references.relations(clock))
     found, silences = _NO_TOPICS, _Silences()
