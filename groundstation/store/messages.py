@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.dataclasses import dataclass
-from groundstation.base.records import Int64Array
+from groundstation.base.records import BoolArray, Int64Array
 
 ByteArray = NDArray[np.uint8]
 
@@ -99,7 +99,8 @@ class ChunkMessages:
             one = join.reduce(pieces, axis=0).view(np.uint8).reshape(rows, self.stride)
             return join(join.reduce(one, axis=0), join.reduce(matrix[whole:], axis=0))  # type: ignore[no-any-return]
 
-        return (over_all(np.bitwise_and) == over_all(np.bitwise_or)).tobytes()
+        same: BoolArray = over_all(np.bitwise_and) == over_all(np.bitwise_or)
+        return same.tobytes()
 
     def is_alike(self, start: int, stop: int) -> bool:
         """Tell whether bytes ``start`` to ``stop`` of each record are those of the first.
