@@ -228,6 +228,8 @@ def split_messages(buffer: ByteArray) -> list[ChunkMessages] | None:
         return None
     starts, sizes = found
     ids = ChunkMessages(buffer, 0, starts, sizes, 0).head("channel_id")
+    if len(ids) and (ids == ids[0]).all():
+        return [ChunkMessages(buffer, int(ids[0]), starts, sizes, 0)]
     order = np.argsort(ids, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(ids[order])) + 1) if len(ids) else []
     return [ChunkMessages(buffer, int(ids[rows[0]]), starts[rows], sizes[rows], 0) for rows in groups]
@@ -245,7 +247,7 @@ def _evenly_spaced(buffer: ByteArray) -> ChunkMessages | None:
     messages = ChunkMessages(
         buffer,
         int(head["channel_id"]),
-        np.arange(count, dtype=np.int64) * stride,
+        np.arange(0, len(buffer), stride, dtype=np.int64),
         np.broadcast_to(np.int64(stride), count),
         stride,
     )

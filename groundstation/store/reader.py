@@ -319,7 +319,7 @@ def _batch(messages: ChunkMessages, decoded: DecodedColumns, definition: _Defini
     device_time, record_index, *columns = decoded.columns
     batch = RecordBatch(
         definition.topic,
-        record_index.values.astype(np.int64),
+        record_index.values.astype(np.int64, copy=False),
         device_time,
         {field.column: column for field, column in zip(definition.fields[2:], columns, strict=True)},
         time_ns,

@@ -20,7 +20,7 @@ from groundstation.base.sorted_values import distinct
 from groundstation.store.marks import RECORD_PREFIX
 from groundstation.store.messages import HEAD, MESSAGE_OPCODE, ByteArray, ChunkMessages, at_any_byte
 from groundstation.store.schema import WireField, varint
-from groundstation.store.walk import locate_fields
+from groundstation.store.walk import Located, locate_fields
 
 MAX_TEXT_BYTES = 64 << 20  # matrix in which the texts of one piece are laid side by side
 ROWS_ALIKE, MAX_PARTIAL = 512, 60  # rows with the same fields that are worth a matrix; fields that some rows lack
@@ -291,22 +291,22 @@ def decode(messages: ChunkMessages, fields: Sequence[WireField]) -> Iterator[Dec
         columns = tuple(_column_of(messages, field, at) for field, at in zip(fields, template, strict=True))
         yield DecodedColumns(columns, len(messages))
         return
-    places, lengths, good = locate_fields(messages, fields)
+    located, good = locate_fields(messages, fields)
     if not good.all():
         none = np.empty(0, np.int64)
         yield DecodedColumns(tuple(absent_column(field, 0) for field in fields), int((~good).sum()), none)
         if not good.any():
             return
+    texts = [k for k, field in enumerate(fields) if field.wire_dtype is None]
     pending = [np.flatnonzero(good)]
     while pending:
         rows = pending.pop()
-        at, width = (places, lengths) if len(rows) == len(messages) else (places[rows], lengths[rows])
-        if len(rows) > 1 and len(rows) * int(width.max(axis=0).sum()) > MAX_TEXT_BYTES:
+        here = located if len(rows) == len(messages) else located.take(rows)
+        if texts and len(rows) > 1 and len(rows) * int(here.lengths[texts].max(axis=1).sum()) > MAX_TEXT_BYTES:
             middle = len(rows) // 2
             pending += [rows[middle:], rows[:middle]]
             continue
-        placed = zip(fields, at.T, width.T, strict=True)
-        columns = tuple(_gathered_column(messages.buffer, *one) for one in placed)
+        columns = tuple(_gathered_column(messages.buffer, field, here, k) for k, field in enumerate(fields))
         yield DecodedColumns(columns, len(rows), None if len(rows) == len(messages) else rows)
 
 
@@ -363,12 +363,15 @@ def _column_of(messages: ChunkMessages, field: WireField, place: tuple[int, int]
     return Column(messages.column(field.wire_dtype, at).astype(field.dtype))  # a copy, free of the chunk
 
 
-def _gathered_column(buffer: ByteArray, field: WireField, places: Int64Array, lengths: Int64Array) -> Column:
+def _gathered_column(buffer: ByteArray, field: WireField, located: Located, k: int) -> Column:
+    """Return the column of a field, the ``k``-th that was located."""
+    places = located.places[k]
     present = places >= 0
-    if not present.any():
+    count = np.count_nonzero(present)
+    if not count:
         return absent_column(field, len(places))
-    places = np.where(present, places, 0)
     if field.wire_dtype is None:
+        lengths = located.lengths[k]
         width = int(lengths.max(initial=0, where=present))
         inside = present[:, np.newaxis] & (np.arange(width) < lengths[:, np.newaxis])
         last = len(buffer) - 1
@@ -376,11 +379,13 @@ def _gathered_column(buffer: ByteArray, field: WireField, places: Int64Array, le
         values: NDArray[Any] = _decode_text(np.where(inside, matrix, 0).astype(np.uint8))
     elif field.wire_type == 0:
         values = buffer[places] != 0
+    elif field.wire_type == 1 and len(located.words):
+        values = located.words[k].view(field.wire_dtype).astype(field.dtype, copy=False)
     else:
         values = at_any_byte(buffer, field.wire_dtype)[places].astype(field.dtype, copy=False)
-    if present.all():
+    if count == len(places):
         return Column(values)
-    values[~present] = _filler(field)
+    values[~present] = _filler(field)  # a place of -1 had the end of the buffer
     return Column(values, present)
 
 

@@ -11,7 +11,7 @@ from groundstation.tables.table import Table
 
 MORE = 8  # a column that is full gets room for an eighth more
 ALIGNED = 64  # bytes
-MOST_AHEAD = 64  # times the rows that came: what a damaged count asks for beyond is not believed
+MOST_AHEAD = 1024  # times the rows that came: what a damaged count asks for beyond is not believed
 
 
 class GrowingTable:

@@ -16,7 +16,7 @@ from mcap.reader import make_reader
 from mcap.records import Channel, Chunk, Header, Message, Schema
 
 from groundstation.base.errors import GroundstationError, UnreadableLogError
-from groundstation.base.records import Damage, LogHeader, RecordBatch
+from groundstation.base.records import Column, Damage, LogHeader, RecordBatch
 from groundstation.store import walk
 from groundstation.store.channel import CHUNK_SPAN_NS
 from groundstation.store.decompress import MAX_CHUNK_BYTES
@@ -24,6 +24,7 @@ from groundstation.store.foreign import ForeignLost, ForeignMcap, ForeignMessage
 from groundstation.store.framing import to_bytes
 from groundstation.store.info import StoreInfo
 from groundstation.store.marks import MAGIC
+from groundstation.store.messages import ChunkMessages
 from groundstation.store.reader import read, read_info
 from groundstation.store.schema import canonical_type
 from tests.store.test_store import assert_same, batch_of, joined, written
@@ -494,6 +495,33 @@ def test_compiled_and_interpreted_walks_agree(tmp_path: Path, monkeypatch: pytes
     for limit in (0, 1 << 40):
         monkeypatch.setattr(walk, "walker", walk.Walker(limit))
         assert_same(joined([item for item in read(path) if isinstance(item, RecordBatch)]), batch)
+
+
+@pytest.mark.parametrize("odd", [0, 1, 1_500, 2_998, 2_999])
+def test_one_record_of_other_fields_is_seen_wherever_it_stands(tmp_path: Path, odd: int) -> None:
+    count = 3_000
+    values = np.arange(count, dtype=float)
+    is_odd = np.arange(count) == odd  # pitch in place of roll: as many bytes, under another tag
+    columns = {"roll_deg": Column(values, ~is_odd), "pitch_deg": Column(values, is_odd)}
+    index = np.arange(count)
+    batch = RecordBatch("ins", index, Column(index), columns, index * 1_000_000)
+    path = written(tmp_path / "a.mcap", [batch])
+    assert_same(joined([item for item in read(path) if isinstance(item, RecordBatch)]), batch)
+
+
+@pytest.mark.parametrize("stride", [31, 33, 139, 5_000])
+@pytest.mark.parametrize("count", [1, 63, 64, 700])
+def test_bytes_that_differ_in_any_record_are_found(count: int, stride: int) -> None:
+    rng = np.random.default_rng(count)
+    matrix = np.tile(rng.integers(0, 256, stride, dtype=np.uint8), (count, 1))
+    for row in {0, count // 2, count - 1} - ({0} if count == 1 else set()):
+        column = int(rng.integers(stride))
+        other = matrix.copy()
+        other[row, column] ^= 1 << int(rng.integers(8))
+        records = ChunkMessages(other.reshape(-1), 1, stride * np.arange(count), np.full(count, stride), stride)
+        alike = [records.is_alike(at, at + 1) for at in range(stride)]
+        assert alike == [count == 1 or at != column for at in range(stride)]
+        assert records.is_alike(0, column) and records.is_alike(column + 1, stride)
 
 
 def test_messages_of_any_mcap_are_read_and_of_a_cut_one_those_before_the_cut(sample: Sample) -> None:

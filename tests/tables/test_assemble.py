@@ -1,10 +1,13 @@
 """Tables from batches and back: fields that come and go, wider types, order, and the pandas types."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Column, RecordBatch
+from groundstation.tables import growing
 from groundstation.tables.assemble import batches_from_flight, flight_from_batches
 from groundstation.tables.table import Flight, Table
 
@@ -57,6 +60,14 @@ def test_a_table_of_many_batches_holds_each_value_once() -> None:
         while held.base is not None:
             held = held.base
         assert held.nbytes <= most * 4_000 * 8
+
+
+def test_no_column_is_moved_for_a_short_first_batch_of_a_long_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(growing, "_moved", lambda *_: pytest.fail("a column was moved"))
+    ends = [0, 100, 50_000, 100_000]  # as chunks of the store come: the first is a part in a thousand
+    parts = [batch("ins", list(range(*pair)), pair[0], roll_deg=np.arange(*pair) * 1e-3) for pair in pairwise(ends)]
+    flight = flight_from_batches(parts, metadata={}, has_utc=True, source_name="a.csv", rows={"ins": 100_000})
+    np.testing.assert_array_equal(flight["ins"].values("roll_deg"), 1e-3 * np.arange(100_000))
 
 
 def test_a_place_that_is_not_on_earth_is_absent_and_raw_topics_keep_it() -> None:
