@@ -75,7 +75,7 @@ def to_tables(path: Path, *, is_surveyed: bool = True) -> int:
     if is_surveyed:
         found = survey(items)
         clock, rows = found.clock, found.ledger.rows
-    batches = corrected(items, clock)
+    batches = corrected(items, clock, for_tables=True)
     flight = flight_from_batches(batches, metadata={}, has_utc=clock.is_absolute, source_name=path.name, rows=rows)
     return sum(len(table) for topic, table in flight.tables.items() if topic.startswith("raw."))
 

@@ -111,14 +111,16 @@ class ClockModel:
         time = np.add(device_time_ns.values, self._offset_ns(record_index), out=out)
         if not len(self.placed_index) or not len(record_index):
             return np.asarray(time, dtype=np.int64)
-        if self.placed_index[-1] < record_index.min() or self.placed_index[0] > record_index.max():
-            return np.asarray(time, dtype=np.int64)
         if (record_index[1:] <= record_index[:-1]).any():
+            if self.placed_index[-1] < record_index.min() or self.placed_index[0] > record_index.max():
+                return np.asarray(time, dtype=np.int64)
             at = np.minimum(np.searchsorted(self.placed_index, record_index), len(self.placed_index) - 1)
             is_placed = self.placed_index[at] == record_index
             time[is_placed] = self.placed_ns[at[is_placed]]
             return np.asarray(time, dtype=np.int64)
         low, high = np.searchsorted(self.placed_index, (record_index[0], record_index[-1] + 1))
+        if low == high:
+            return np.asarray(time, dtype=np.int64)
         at = np.searchsorted(record_index, self.placed_index[low:high])  # few are placed: they are looked for
         found = record_index[at] == self.placed_index[low:high]
         time[at[found]] = self.placed_ns[low:high][found]

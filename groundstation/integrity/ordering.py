@@ -8,7 +8,7 @@ from groundstation.base.records import MAX_BATCH_ROWS, BoolArray, Column, Item, 
 from groundstation.integrity.clock import ClockModel
 
 
-def corrected(items: Iterable[Item], clock: ClockModel) -> Iterator[RecordBatch]:
+def corrected(items: Iterable[Item], clock: ClockModel, *, for_tables: bool = False) -> Iterator[RecordBatch]:
     """Yield the batches of a log with corrected time, each topic in time order.
 
     ``time_ns`` never decreases within a topic. A record is held back until no earlier one of its topic can follow,
@@ -21,29 +21,38 @@ def corrected(items: Iterable[Item], clock: ClockModel) -> Iterator[RecordBatch]
         The same log again.
     clock : ClockModel
         From the survey of that log.
+    for_tables : bool
+        The last rows of a topic with late records come with those before them, in one batch: a table of one batch has
+        its arrays, and copies none. Topics then come in another order.
     """
     if not clock.has_times:
         return
-    held: dict[str, RecordBatch] = {}
+    held: dict[str, tuple[RecordBatch, int]] = {}  # with the number of rows before which no earlier one can come
     reached: dict[str, int] = {}
     for item in items:
         if not isinstance(item, RecordBatch) or not len(item):
             continue
         batch = clock.correct(item)
         topic, lateness = batch.topic, clock.lateness_ns.get(item.topic, 0)
-        if lateness:
-            if topic in held:
-                batch = joined([held.pop(topic), batch])
-            batch = _ordered(batch)
-            time = _times(batch)
-            reached[topic] = max(reached.get(topic, int(time[-1])), int(time[-1]))
-            ready = int(np.searchsorted(time, reached[topic] - lateness, side="right"))
-            if ready < len(batch):
-                held[topic] = batch.take(slice(ready, None))
-                batch = batch.take(slice(0, ready))
-        yield from _bounded(batch)
+        if not lateness:
+            yield from _bounded(batch)
+            continue
+        if topic in held:
+            before, ready = held.pop(topic)
+            if ready:
+                yield from _bounded(before.take(slice(0, ready)))
+            batch = joined([before.take(slice(ready, None)), batch]) if ready < len(before) else batch
+        batch = _ordered(batch)
+        time = _times(batch)
+        reached[topic] = max(reached.get(topic, int(time[-1])), int(time[-1]))
+        ready = int(np.searchsorted(time, reached[topic] - lateness, side="right"))
+        if ready and not for_tables:
+            yield from _bounded(batch.take(slice(0, ready)))
+            batch, ready = batch.take(slice(ready, None)), 0
+        if len(batch):
+            held[topic] = batch, ready
     for topic in sorted(held):
-        yield from _bounded(held[topic])
+        yield from _bounded(held[topic][0])
 
 
 def _times(batch: RecordBatch) -> np.ndarray[tuple[int], np.dtype[np.int64]]:

@@ -52,8 +52,8 @@ class BatchPlaces:
         device, validity = batch.device_time_ns, batch.validity_time_ns
         return (
             len(self.index) == len(batch)
-            and np.array_equal(self.index, batch.record_index)
-            and np.array_equal(self.time.values, device.values)
+            and _are_equal(self.index, batch.record_index)
+            and _are_equal(self.time.values, device.values)
             and (self.time.present is device.present or np.array_equal(self.time.mask, device.mask))
             and _are_equal(self.validity_ns, validity)
         )

@@ -126,6 +126,28 @@ def test_held_back_records_come_in_order_and_in_bounded_pieces() -> None:
     assert all(piece.time_ns is not None for piece in out)
 
 
+def test_a_topic_of_one_batch_comes_whole_where_tables_are_made() -> None:
+    items: list[Item] = [LogHeader("t"), batch("ins", [0, 1, 3, 2, 4]), batch("gnss", [0, 1, 2], 5)]
+    clock = survey(items).clock
+    assert [len(piece) for piece in corrected(items, clock) if piece.topic == "ins"] == [4, 1]
+    gnss, ins = corrected(items, clock, for_tables=True)
+    assert (gnss.topic, len(gnss)) == ("gnss", 3)
+    assert ins.record_index.tolist() == [0, 1, 3, 2, 4]
+
+
+@pytest.mark.parametrize("pieces", [1, 3, 9])
+def test_tables_get_the_rows_of_a_stream(pieces: int) -> None:
+    times = np.arange(27) + np.tile([0, 3, 0, -2, 0, 0, 1, 0, 0], 3)
+    several = np.array_split(times, pieces)
+    firsts = np.cumsum([0, *map(len, several[:-1])]).tolist()
+    given = [batch("ins", some.tolist(), first) for some, first in zip(several, firsts, strict=True)]
+    items: list[Item] = [LogHeader("t"), *given]
+    clock = survey(items).clock
+    streamed, whole = (joined(list(corrected(items, clock, for_tables=is_for))) for is_for in (False, True))
+    assert np.array_equal(streamed.record_index, whole.record_index)
+    assert whole.time_ns is not None and (np.diff(whole.time_ns) >= 0).all()
+
+
 def test_equal_times_keep_the_order_of_the_source() -> None:
     items: list[Item] = [LogHeader("t"), batch("ins", [0, 1, 1, 1, 3, 4, 2, 5, 6])]
     (out,) = (piece for piece in [joined(list(corrected(items, survey(items).clock)))])

@@ -275,7 +275,7 @@ def _read(log: Log) -> "tuple[Flight, tuple[Damage, ...], bool]":
         return tables(kept, info.metadata, info.has_utc, info.ledger.rows), damages, info.has_utc
     replay = log.replay()
     found = survey(replay)
-    kept = [one for one in corrected(replay, found.clock) if kind_of(one.topic) in kinds]
+    kept = [one for one in corrected(replay, found.clock, for_tables=True) if kind_of(one.topic) in kinds]
     told = {f"{one.code}.{one.topic}.{name}": one.text for one in found.remarks for name in one.fields}
     return (
         tables(kept, {**found.header.metadata, **told}, found.clock.is_absolute, found.ledger.rows),

@@ -251,7 +251,7 @@ def _recorded(log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool) 
         from groundstation.tables.assemble import flight_from_batches
 
         metadata = {**found.header.metadata, **told_of_fields(found.remarks)}
-        batches = corrected(items, found.clock)
+        batches = corrected(items, found.clock, for_tables=True)
         flight = flight_from_batches(
             batches,
             metadata=metadata,

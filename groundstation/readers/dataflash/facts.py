@@ -6,6 +6,7 @@ import numpy as np
 
 from groundstation.base.records import BoolArray, Int64Array, Remark, UtcReadings
 from groundstation.base.signals import RAW_PREFIX
+from groundstation.base.sorted_values import quantile
 from groundstation.base.source_units import PREFIX
 from groundstation.base.timescales import gps_week_to_utc_ns, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
@@ -140,13 +141,13 @@ def _disagreement(zeros_ns: Int64Array, device_ns: Int64Array) -> list[Remark]:
 
     Speeds and rates suffer from such a drift.
     """
-    low, high = np.percentile(zeros_ns - zeros_ns[0], (5.0, 95.0))
+    low, high = (quantile(zeros_ns - zeros_ns[0], share) for share in (0.05, 0.95))
     if high - low <= _SPREAD_NS:
         return []
     text = f"the difference of GPS time and the autopilot's clock changes by {(high - low) / NS_PER_S:.1f} s in the log"
     half = len(zeros_ns) // 2
     change, span = (
-        np.median(values[half:]) - np.median(values[:half]) for values in (zeros_ns - zeros_ns[0], device_ns)
+        quantile(values[half:], 0.5) - quantile(values[:half], 0.5) for values in (zeros_ns - zeros_ns[0], device_ns)
     )
     drift = change / max(span, 1.0)
     if _DRIFT < abs(drift) < _MOST_DRIFT:
