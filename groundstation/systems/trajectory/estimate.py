@@ -196,13 +196,15 @@ def hypotheses_of(problem: Problem, model: Model, rules: Gate) -> tuple[Hypothes
     )
     early = int(np.searchsorted(plan.epoch_s, _first_motion_s(problem.gnss, plan.epoch_s[0]) + PRUNE_S))
     early = min(early, len(plan.epoch_s))
+    rooms = [linear_room(plan), linear_room(plan)]  # what is linearised is not kept: two at once need two
 
     def run(begin: int, end: int, now: Now, work: Room) -> float:
-        """Filter a span of epochs; what it is linearised by is not kept."""
-        room = linear_room(plan)
-        return filter_epochs(
+        room = rooms.pop()
+        value = filter_epochs(
             problem.samples, plan, noise, rules, OWN_ESTIMATE, (begin, end), now, work, room, nothing_kept()
         )
+        rooms.append(room)
+        return value
 
     def begun(start: Start) -> tuple[float, Start, Now, Room]:
         now, work = start.now(), make_room(start.prior)
