@@ -38,12 +38,19 @@ def importing() -> Iterator[None]:
             gc.enable()
 
 
+def search_rarely() -> None:
+    """Search for garbage once in 200 000 new objects from now on, for a worker process.
+
+    Python's own number is 700. What is in no circle is freed at once, as ever.
+    """
+    gc.set_threshold(NEW_OBJECTS, *gc.get_threshold()[1:])
+
+
 @contextmanager
 def rarely_searched() -> Iterator[None]:
     """Search for garbage once in 200 000 new objects, and not at the end of the process.
 
-    Python's own number is 700. What is in no circle is freed at once, as ever. For processes of the command line alone,
-    like :func:`importing`.
+    For processes of the command line alone, like :func:`importing`.
 
     Examples
     --------
@@ -55,7 +62,7 @@ def rarely_searched() -> Iterator[None]:
     True
     """
     usual = gc.get_threshold()
-    gc.set_threshold(NEW_OBJECTS, *usual[1:])
+    search_rarely()
     try:
         yield
     finally:

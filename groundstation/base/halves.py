@@ -8,16 +8,26 @@ from typing import TypeVar
 One = TypeVar("One")
 Other = TypeVar("Other")
 
+_sharing = [1]  # processes that share the cores, this one among them
+
+
+def share_cores(processes: int) -> None:
+    """Note that so many processes work side by side: each takes its share of the cores."""
+    _sharing[0] = max(processes, 1)
+
 
 def cores() -> int:
     """Return the number of cores that this process may use.
+
+    Where several work side by side it is a share of them.
 
     Examples
     --------
     >>> cores() >= 1
     True
     """
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    every = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(every // _sharing[0], 1)
 
 
 def both(first: Callable[[], Other], second: Callable[[], object]) -> Other:

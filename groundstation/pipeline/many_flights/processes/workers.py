@@ -20,6 +20,8 @@ from multiprocessing.connection import wait as wait_for
 from typing import Any, Generic
 
 from groundstation.base.dataclasses import dataclass
+from groundstation.base.garbage import search_rarely
+from groundstation.base.halves import share_cores
 from groundstation.base.without_pandas import spare_pandas
 from groundstation.pipeline.many_flights.processes.crew import AnyJob, Work
 from groundstation.pipeline.one_flight.outcome import Outcome
@@ -115,7 +117,11 @@ def _until_broken(
     Where a job takes too long, those that were in the pool with it are in the queue again.
     """
     pool = ProcessPoolExecutor(
-        workers, mp_context=_CONTEXT, initializer=_begin, initargs=(sender,), max_tasks_per_child=tasks_per_process
+        workers,
+        mp_context=_CONTEXT,
+        initializer=_begin,
+        initargs=(sender, workers),
+        max_tasks_per_child=tasks_per_process,
     )
     running: dict[Future[Outcome], tuple[int, AnyJob]] = {}
 
@@ -171,8 +177,8 @@ def _run(run: Callable[[AnyJob, Listener], Outcome], number: int, job: AnyJob) -
     return run(job, _tell)
 
 
-def _begin(sender: Connection) -> None:
-    """Set up a worker process.
+def _begin(sender: Connection, workers: int) -> None:
+    """Set up a worker process, one of so many.
 
     Its stages are told through the pipe, and it ends with the run, however that ends.
     """
@@ -180,6 +186,8 @@ def _begin(sender: Connection) -> None:
     _tell = _teller(sender)
     _tell_begin = partial(_send, sender)
     spare_pandas()
+    search_rarely()
+    share_cores(workers)
     threading.Thread(target=_end_with_the_run, name="parent", daemon=True).start()
 
 
