@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from groundstation.base.angles import FloatArray
 from groundstation.base.dataclasses import dataclass
 from groundstation.base.records import Column, Int64Array
+from groundstation.base.sorted_values import distinct
 from groundstation.readers.dataflash.definitions import FieldSpec, RecordDefinition
 
 LATEST_NS = 1 << 61  # 73 years after power-up: a time past it was not written by a clock
@@ -84,8 +85,8 @@ def rows_of(definition: RecordDefinition, records: NDArray[Any], record_index: I
 def by_instance(rows: RecordRows, name: str) -> Iterator[RecordRows]:
     """Rows of each value of an instance field, by increasing value."""
     values = rows.values(name).astype(np.int64)
-    for value in np.unique(values).tolist():
-        part = rows.take(values == value)
+    for value in distinct(values).tolist():
+        part = rows.take(np.flatnonzero(values == value))
         yield RecordRows(part.definition, value, part.record_index, part.time_ns, part.records)
 
 
