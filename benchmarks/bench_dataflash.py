@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,6 +16,7 @@ import numpy as np
 from benchmarks.least import chunks_of, write_the_least
 from benchmarks.record import ROUNDS, Book, Goal, Times, by_turns
 from benchmarks.recorded import LOGS, are_here
+from groundstation.base.records import RecordBatch
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.ordering import corrected
 from groundstation.integrity.survey import survey
@@ -22,6 +24,7 @@ from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.readers.dataflash import read
 from groundstation.readers.dataflash.blocks import Scanner
+from groundstation.readers.dataflash.values import rows_of
 from groundstation.readers.source import Source
 from groundstation.tables.assemble import flight_from_batches
 
@@ -71,10 +74,13 @@ def damaged(source: Path, target: Path, seed: int = 1) -> None:
 def to_tables(path: Path, *, is_surveyed: bool = True) -> int:
     """Read and make the tables of all topics, the clock repaired and a ledger made; returns the number of records."""
     items = list(read(Source(path)))
-    clock, rows = ClockModel(has_times=True), {}
+    clock, rows = ClockModel(has_times=True), Counter[str]()
+    for item in items if not is_surveyed else ():
+        if isinstance(item, RecordBatch):
+            rows[item.topic] += len(item)
     if is_surveyed:
         found = survey(items)
-        clock, rows = found.clock, found.ledger.rows
+        clock, rows = found.clock, Counter(found.ledger.rows)
     batches = corrected(items, clock, for_tables=True)
     flight = flight_from_batches(batches, metadata={}, has_utc=clock.is_absolute, source_name=path.name, rows=rows)
     return sum(len(table) for topic, table in flight.tables.items() if topic.startswith("raw."))
@@ -92,6 +98,27 @@ def least_work(path: Path) -> None:
                 values = np.ascontiguousarray(records[spec.name])
                 if values.dtype.kind in "iuf" and values.ndim == 1:
                     np.maximum.reduce(values)
+
+
+def raw_tables(path: Path) -> None:
+    """Make the tables of the raw topics alone, with nothing counted: the second limit.
+
+    Records are found, each field becomes a column in its unit, texts among them, and so do places and times; the
+    columns are laid together, numbers gone over once and times twice.
+    """
+    parts: dict[str, list[list[np.ndarray]]] = {}
+    for block in Scanner(Source(path)):
+        for definition, which in block.groups():
+            if definition.fields:
+                rows = rows_of(definition, block.records(definition, which), block.first_index + which)
+                columns = [column.values for column in rows.columns().values()]
+                parts.setdefault(definition.name, []).append([rows.time_ns.values, rows.record_index, *columns])
+    for several in parts.values():
+        tables = [np.concatenate(pieces) for pieces in zip(*several, strict=True)]
+        np.diff(tables[0]).max(initial=0)
+        for values in tables:
+            if values.dtype.kind in "iuf":
+                np.maximum.reduce(values)
 
 
 def surveyed(path: Path) -> None:
@@ -160,6 +187,7 @@ def report(book: Book, path: Path, folder: Path, rounds: int) -> None:
         "convert": new_each_time(lambda: convert_log(open_log(path), target), target),
         "broken": lambda: to_tables(broken),
         "least": lambda: least_work(path),
+        "raw": lambda: raw_tables(path),
         "surveyed": lambda: surveyed(path),
         "least convert": lambda: least_convert(path, chunks, broken.with_name("least.mcap")),
     }
@@ -185,12 +213,13 @@ def beside_pymavlink(book: Book, log: str, times: dict[str, Times]) -> None:
         ("to tables", "to tables with ledger", TABLES_GOAL),
         ("convert", "to MCAP", CONVERT_GOAL),
         ("least", "limit: records found, fields copied and gone over once", None),
+        ("raw", "limit: tables of raw topics alone, scaled, nothing counted", None),
         ("surveyed", "limit: read, ledger made, nothing written", None),
         ("least convert", "limit: read, ledger made, then the least of writing", None),
     ):
         for peer, told, limit in (("bare", "recv_msg", goal), ("values", "recv_msg with its values", None)):
             given = {"goal": limit, "is_times": True, "distribution": "pymavlink"}
-            if peer == "values" and work in ("least", "surveyed", "least convert"):
+            if peer == "values" and what.startswith("limit"):
                 continue
             book.against(f"{log} {what}", times[work], times[peer], f"pymavlink {told}", **given)
 

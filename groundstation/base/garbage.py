@@ -1,4 +1,4 @@
-"""Imports kept out of the garbage collector's searches, and freed memory given back to the system.
+"""Imports kept out of the garbage collector's searches; freed memory given back.
 
 A run imports some 1800 modules, and Python's search for garbage went through them again and again as they came, then at
 the end of the process: a seventh of the processor time of `run` on a short log, a fifth of that of `convert`.

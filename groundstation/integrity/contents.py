@@ -47,7 +47,7 @@ class _FieldTally:
         self.present += len(column.values) if rows is None else len(rows)
         if column.values.dtype.kind != "f":
             return
-        values = column.values if rows is None else column.values[rows]
+        values = column.values if rows is None else column.values.take(rows)  # two thirds of an index's time
         if self._may_be_odd(values):
             values, rows = self._without_odd(values, rows, record_index, device_ns)
         if self.constancy is not None:

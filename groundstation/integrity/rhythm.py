@@ -126,7 +126,9 @@ def rhythm_of(topic: str, time_ns: Int64Array, thresholds: Thresholds, pauses: S
 
 
 def _some_ahead(steps_ns: Int64Array, ahead: int) -> Int64Array:
-    """Return every so manieth of the steps ahead, whose number is ``ahead``; a long log's are gone through in parts.
+    """Return some of the steps ahead, evenly spread; ``ahead`` is the number of all.
+
+    Those of a long log are gone through in parts.
 
     Examples
     --------

@@ -76,12 +76,13 @@ def occupied(part: TopicPart) -> TopicPart | None:
     rows: BoolArray = np.logical_or.reduce(list(masks.values())) if len(masks) > 1 else next(iter(masks.values()))
     if rows.all():
         return part
-    if not rows.any():
+    at = np.flatnonzero(rows)
+    if not len(at):
         return None
-    taken = {identity: frozen(mask[rows]) for identity, mask in masks.items()}
-    kept = {name: Column(column.values[rows], taken[id(column.present)]) for name, column in part.columns.items()}
-    validity_ns = None if part.validity_ns is None else part.validity_ns[rows]
-    return TopicPart(part.index[rows], part.time.take(rows), kept, validity_ns, part.source)
+    taken = {identity: frozen(mask[at]) for identity, mask in masks.items()}
+    kept = {name: Column(column.values[at], taken[id(column.present)]) for name, column in part.columns.items()}
+    validity_ns = None if part.validity_ns is None else part.validity_ns[at]
+    return TopicPart(part.index[at], part.time.take(at), kept, validity_ns, part.source)
 
 
 def merged(topic: str, parts: Sequence[TopicPart]) -> RecordBatch:

@@ -126,7 +126,9 @@ class _Growing:
 
 
 def _at_once(kinds: Sequence[np.dtype[Any]], rows: int) -> list[NDArray[Any]]:
-    """Return an array of each type, all in one piece of memory: the system gives larger pages for it.
+    """Return an array of each type, all in one piece of memory.
+
+    The system gives larger pages for it.
 
     Examples
     --------

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from groundstation.base.records import Damage
 from groundstation.readers.dataflash.definitions import Units, parse
+from groundstation.readers.dataflash.values import rows_of
 from tests.readers.dataflash_writer import DataFlash
 from tests.readers.test_dataflash import Log
 from tests.real_logs import real_log
@@ -362,3 +363,16 @@ def test_satellites_and_dilution_of_recorded_logs(
     read = Log(tmp_path / "log.BIN", real_log(name).read_bytes())
     assert set(read.present("gnss", "satellites_used")) == satellites
     assert min(read.present("gnss", "hdop")) >= hdop[0] and max(read.present("gnss", "hdop")) <= hdop[1]
+
+
+def test_a_column_is_made_once_and_cannot_be_changed() -> None:
+    definition = parse(1, 3 + 2 + 4 + 2, "ATT", "cfh", ["Roll", "Pitch", "Yaw"])
+    records = np.zeros(2, dtype=definition.dtype)
+    records["Roll"], records["Pitch"], records["Yaw"] = (150, -250), (0.5, np.nan), (7, -7)
+    rows = rows_of(definition, records, np.arange(2))
+    raw = rows.columns()
+    assert rows.doubles("Roll").tolist() == [1.5, -2.5] and rows.doubles("Yaw", 0.5).tolist() == [3.5, -3.5]
+    assert np.shares_memory(rows.doubles("Roll"), raw["Roll"].values)
+    assert rows.doubles("Pitch", 2.0) is rows.doubles("Pitch", 2.0)
+    with pytest.raises(ValueError, match="read-only"):
+        rows.doubles("Roll")[0] = 0.0

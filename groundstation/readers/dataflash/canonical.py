@@ -146,10 +146,7 @@ class Mapper:
             passed_over = rule.passed_over(definition, units)
             if passed_over is not None:
                 self._passed_over[topic, rule.field] = (passed_over, f"{definition.name}.{rule.source}")
-            values = rows.doubles(rule.source)
-            if factor != 1.0:
-                values *= factor
-            found[rule.field] = values
+            found[rule.field] = rows.doubles(rule.source, factor)
         return found
 
     def _placed(self, topic: str, values: Mapping[str, FloatArray], claimed: BoolArray | bool = True) -> BoolArray:

@@ -13,6 +13,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.dataclasses import dataclass
 from groundstation.base.geodesy import has_position
 from groundstation.base.records import BoolArray, Damage, Int64Array
+from groundstation.base.sorted_values import distinct
 from groundstation.readers.dataflash.blocks import RecordBlock, Scanner
 from groundstation.readers.dataflash.definitions import RecordDefinition, Units
 from groundstation.readers.dataflash.rules import FIX_3D, SIGMAS, FieldRule, UnknownUnits
@@ -184,7 +185,7 @@ class _Survey:
             rows = rows_of(definition, block.records(definition, which), block.first_index + which)
             seen = self._instances.setdefault((definition.type_id, name), set())
             if instance_field is not None and len(seen) <= MOST_INSTANCES:
-                seen.update(np.unique(rows.values(instance_field)).tolist())
+                seen.update(distinct(rows.values(instance_field)).tolist())
             if name in self._takers:
                 self._takers[name](rows)
 

@@ -4,6 +4,7 @@ Implied scales are applied, texts end at their first NUL, times are in nanosecon
 """
 
 from collections.abc import Iterator
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.dataclasses import dataclass
-from groundstation.base.records import Column, Int64Array
+from groundstation.base.records import Column, Int64Array, frozen
+from groundstation.base.sorted_values import distinct
 from groundstation.readers.dataflash.definitions import FieldSpec, RecordDefinition
 
 LATEST_NS = 1 << 61  # 73 years after power-up: a time past it was not written by a clock
@@ -20,6 +22,8 @@ LATEST_NS = 1 << 61  # 73 years after power-up: a time past it was not written b
 @dataclass(frozen=True, eq=False)
 class RecordRows:
     """Records of one type, or of one instance of it, from one block.
+
+    A column that was made is kept, read-only: raw and canonical topics share it.
 
     Parameters
     ----------
@@ -37,25 +41,29 @@ class RecordRows:
     record_index: Int64Array
     time_ns: Column
     records: NDArray[Any]
+    _made: dict[tuple[str, float | None], NDArray[Any]] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
         return len(self.record_index)
 
     def values(self, name: str) -> NDArray[Any]:
         """Column of one field that is no array, as :func:`column` gives it."""
-        spec = self.definition.find(name)
-        assert spec is not None, f"{self.definition.name} has no {name}"
-        return column(self.records, spec)
+        if (name, None) not in self._made:
+            spec = self.definition.find(name)
+            assert spec is not None, f"{self.definition.name} has no {name}"
+            self._made[name, None] = frozen(column(self.records, spec))
+        return self._made[name, None]
 
-    def doubles(self, name: str) -> FloatArray:
-        """Column of one field of numbers in double precision, a signalling NaN made a quiet one."""
-        spec = self.definition.find(name)
-        assert spec is not None, f"{self.definition.name} has no {name}"
-        values = self.records[name]
-        if spec.divisor:
-            return np.asarray(values / spec.divisor)
-        with np.errstate(invalid="ignore"):
-            return values.astype(np.float64, order="C")
+    def doubles(self, name: str, factor: float = 1.0) -> FloatArray:
+        """Column of one field of numbers in double precision, times a factor.
+
+        A signalling NaN is made a quiet one.
+        """
+        if (name, factor) not in self._made:
+            with np.errstate(invalid="ignore"):
+                values = self.values(name).astype(np.float64, copy=False)
+            self._made[name, factor] = values if factor == 1.0 else frozen(values * factor)
+        return self._made[name, factor]
 
     def columns(self) -> dict[str, Column]:
         """All columns; a field of 32 numbers becomes 32 columns."""
@@ -66,7 +74,7 @@ class RecordRows:
             elif self.definition.name == "FILE" and spec.character == "Z":
                 found[spec.name] = Column(_hexadecimal(self.records[spec.name]))
             else:
-                found[spec.name] = Column(column(self.records, spec))
+                found[spec.name] = Column(self.values(spec.name))
         return found
 
     def take(self, which: Any) -> "RecordRows":
@@ -84,8 +92,8 @@ def rows_of(definition: RecordDefinition, records: NDArray[Any], record_index: I
 def by_instance(rows: RecordRows, name: str) -> Iterator[RecordRows]:
     """Rows of each value of an instance field, by increasing value."""
     values = rows.values(name).astype(np.int64)
-    for value in np.unique(values).tolist():
-        part = rows.take(values == value)
+    for value in distinct(values).tolist():
+        part = rows.take(np.flatnonzero(values == value))
         yield RecordRows(part.definition, value, part.record_index, part.time_ns, part.records)
 
 

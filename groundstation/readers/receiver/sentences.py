@@ -406,7 +406,7 @@ def time_of_day_ns(value: Int64Array, behind: Int64Array) -> tuple[Int64Array, B
 
 
 def _decimal(value: Int64Array, behind: Int64Array) -> NDArray[np.float64]:
-    """Return the numbers of digits as one integer and of how many of them stand behind the point.
+    """Return numbers, of their digits as one integer and how many stand behind the point.
 
     Examples
     --------
