@@ -29,7 +29,7 @@ def adjoint_over_scalar(at: int, linear: Linear, solved: Solved, a: FloatArray) 
     Returns the adjoint of the noise of the measurement itself.
     """
     K = solved.K[at]
-    total = solved.y[at] * (1.0 / solved.S[at])
+    total: float = solved.y[at] * (1.0 / solved.S[at])
     for j in range(STATES):
         total += K[j] * a[j]
     for e in range(WIDTH):
@@ -60,7 +60,8 @@ def spread_over_scalar(at: int, linear: Linear, solved: Solved, A: FloatArray, u
 
     Returns that of the noise of the measurement itself.
     """
-    K, inner = solved.K[at], 1.0 / solved.S[at]
+    K = solved.K[at]
+    inner: float = 1.0 / solved.S[at]
     fill_product(A, K, u)
     for j in range(STATES):
         inner += K[j] * u[j]
