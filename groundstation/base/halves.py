@@ -23,7 +23,8 @@ def cores() -> int:
 def both(first: Callable[[], Other], second: Callable[[], object]) -> Other:
     """Run two functions at once, the second in a thread of its own.
 
-    Returns what the first returns. It is for work in compiled loops, which run beside Python. Raises what one of them raises, when both have ended.
+    It is for work in compiled loops, which run beside Python. Returns what the first returns, and raises what one of
+    them raises, when both have ended.
 
     Examples
     --------
