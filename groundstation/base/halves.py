@@ -31,9 +31,10 @@ def cores() -> int:
 
 
 def both(first: Callable[[], Other], second: Callable[[], object]) -> Other:
-    """Run two functions at once, the second in a thread of its own; return what the first does.
+    """Run two functions at once, the second in a thread of its own.
 
-    It is for work in compiled loops, which run beside Python. Raises what one of them raises, when both have ended.
+    It is for work in compiled loops, which run beside Python. Returns what the first returns, and raises what one of
+    them raises, when both have ended.
 
     Examples
     --------
@@ -61,9 +62,9 @@ def both(first: Callable[[], Other], second: Callable[[], object]) -> Other:
 
 
 def two_at_once(function: Callable[[One], Other], items: Sequence[One]) -> list[Other]:
-    """Return what a function makes of each item, in their order; two are made at once where there are two cores.
+    """Return what a function makes of each item, in their order.
 
-    It is for work in compiled loops, as :func:`both`.
+    Two are made at once where there are two cores. It is for work in compiled loops, as :func:`both`.
 
     Examples
     --------

@@ -29,7 +29,7 @@ def adjoint_over_scalar(at: int, linear: Linear, solved: Solved, a: FloatArray) 
     Returns the adjoint of the noise of the measurement itself.
     """
     K = solved.K[at]
-    total = solved.y[at] * (1.0 / solved.S[at])
+    total: float = solved.y[at] * (1.0 / solved.S[at])
     for j in range(STATES):
         total += K[j] * a[j]
     for e in range(WIDTH):
@@ -41,7 +41,10 @@ def adjoint_over_scalar(at: int, linear: Linear, solved: Solved, a: FloatArray) 
 
 @inlined
 def fill_product(A: FloatArray, v: FloatArray, u: FloatArray) -> None:
-    """Fill u with A v of a symmetric A, five columns at once: one after the other they take twice as long."""
+    """Fill u with A v, for a symmetric A.
+
+    Five columns at once, in the order of one after the other: those take twice as long.
+    """
     for i in range(STATES):
         u[i] = 0.0
     for j in range(0, STATES, 5):
@@ -60,7 +63,8 @@ def spread_over_scalar(at: int, linear: Linear, solved: Solved, A: FloatArray, u
 
     Returns that of the noise of the measurement itself.
     """
-    K, inner = solved.K[at], 1.0 / solved.S[at]
+    K = solved.K[at]
+    inner: float = 1.0 / solved.S[at]
     fill_product(A, K, u)
     for j in range(STATES):
         inner += K[j] * u[j]
@@ -103,7 +107,7 @@ def adjoint_over_step(e: int, pattern: Pattern, linear: Linear, a: FloatArray, u
 
 @in_place
 def spread_over_step(e: int, pattern: Pattern, linear: Linear, A: FloatArray, w: FloatArray) -> None:
-    """Take the adjoint's covariance back over the transition that leads to epoch e: A <- F' A F."""
+    """Take the adjoint's covariance back over the transition to epoch e: A <- F' A F."""
     F = linear.F[e]
     for c in range(LEV):  # w = F' A, the rows that change by navigation, which are nine
         keep = 1.0 if c >= NAVIGATION else 0.0

@@ -107,7 +107,10 @@ def linearise(e: int, schedule: Schedule, seen: Seen, now: Now, room: Room, line
 
 @inlined
 def _rows_of_navigation(F: FloatArray, p: FloatArray, w: FloatArray) -> None:
-    """Fill the first rows of w with F p: six columns of F at once, in the order of one after the other."""
+    """Fill the first rows of w with F p.
+
+    Six columns of F at once, in the order of one after the other.
+    """
     for t in range(NAVIGATION):
         for j in range(STATES):
             w[t, j] = 0.0
@@ -120,7 +123,10 @@ def _rows_of_navigation(F: FloatArray, p: FloatArray, w: FloatArray) -> None:
 
 @inlined
 def _square_of_navigation(F: FloatArray, p: FloatArray, w: FloatArray) -> None:
-    """Fill the first square of p with w F', three columns at once: a sum waits for its last term."""
+    """Fill the first square of p with w F'.
+
+    Three columns at once: a sum waits for its last term.
+    """
     for t in range(NAVIGATION):
         for u in range(t - t % 3, NAVIGATION, 3):
             x, y, z = 0.0, 0.0, 0.0
@@ -136,9 +142,10 @@ def _square_of_navigation(F: FloatArray, p: FloatArray, w: FloatArray) -> None:
 
 @in_place
 def predict_covariance(pattern: Pattern, F: FloatArray, p: FloatArray, w: FloatArray) -> None:
-    """Predict the covariance: p <- F p F', by the shape of the pattern (``states.transition_pattern``).
+    """Predict the covariance: p <- F p F'.
 
-    It is what the kernel of this name does, to the last bit, in half the time.
+    It is what the kernel of this name does, to the last bit, in half the time, by the shape of the pattern
+    (``states.transition_pattern``).
     """
     rows, starts, _columns = pattern
     _rows_of_navigation(F, p, w)

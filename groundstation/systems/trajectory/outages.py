@@ -161,7 +161,10 @@ def hidden(plan: Plan, windows: FloatArray) -> BoolArray:
 
 
 def without(estimate: Estimate, windows: FloatArray) -> Pass:
-    """Solve again without GNSS in windows of time, shape (w, 2); smoothed inside them, both ends included."""
+    """Solve again without GNSS in windows of time, shape (w, 2).
+
+    It is smoothed inside them, both ends included.
+    """
     base, problem = estimate.result, estimate.problem
     times, gone = base.plan.epoch_s, hidden(base.plan, windows)
     wanted = np.zeros(len(times), dtype=bool)

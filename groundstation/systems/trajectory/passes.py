@@ -245,7 +245,8 @@ def run_pass(
         int(np.argmax(smoothed)) if has_sigmas and smoothed.any() else epochs,
         seldom,
         np.zeros(STATES),
-        *square,
+        square[0],
+        square[1],
         np.zeros(STATES),
         x,
         variance,
@@ -276,7 +277,7 @@ def run_pass(
 
 
 def _with_groups(wanted: BoolArray, seldom: int) -> BoolArray:
-    """Return the epochs that are wanted, and those behind them up to where variances of the biases are smoothed."""
+    """Return the epochs that are wanted, and those behind them up to variances of biases."""
     group = -(-np.arange(len(wanted)) // seldom)
     return np.asarray(np.isin(group, group[wanted]))
 

@@ -174,7 +174,10 @@ def score_of(
 def _differences(
     variances: Callable[[FloatArray], Variances], at: FloatArray, number: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return by how much the variances of noise, measurements and start change over two steps of one number."""
+    """Return by how much the variances change over two steps of one number.
+
+    Those of noise, of measurements, of the start.
+    """
     step = np.zeros(len(at))
     step[number] = STEP
     up, down = variances(at + step), variances(at - step)
