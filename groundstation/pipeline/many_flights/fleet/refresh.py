@@ -17,6 +17,7 @@ from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.many_flights.fleet.columns import FlightShare, dataset_schema
+from groundstation.pipeline.many_flights.fleet.early import EarlyShares
 from groundstation.pipeline.many_flights.fleet.keys import FlightKeys, Key, key_path, month_of, read_keys, write_keys
 from groundstation.pipeline.many_flights.fleet.rows import share_of
 from groundstation.pipeline.many_flights.fleet.samples import SampleStore
@@ -50,7 +51,7 @@ class MonthJob:
         return self.month
 
 
-def refresh(out: Path, crew: Crew | None = None) -> tuple[Scan, tuple[Outcome, ...]]:
+def refresh(out: Path, crew: Crew | None = None, early: EarlyShares | None = None) -> tuple[Scan, tuple[Outcome, ...]]:
     """Bring the datasets of flights and of samples up to date with the flight folders.
 
     Parameters
@@ -58,6 +59,8 @@ def refresh(out: Path, crew: Crew | None = None) -> tuple[Scan, tuple[Outcome, .
     out : Path
     crew : Crew, optional
         Who reads the folders that changed, where they are many; left out: this process.
+    early : EarlyShares, optional
+        Shares of flights that have been read already.
 
     Returns
     -------
@@ -71,8 +74,11 @@ def refresh(out: Path, crew: Crew | None = None) -> tuple[Scan, tuple[Outcome, .
     fresh = before.fresh.without(lost, "samples")
     jobs = list(_jobs(before, fresh))
     here: Crew = partial(in_turn, listen=silent)
-    is_much = crew is not None and sum(len(job.read) for job in jobs) > MOST_READ_HERE
-    ended = dict((crew if crew is not None and is_much else here)(enumerate(jobs), write_month))
+    early = EarlyShares(out) if early is None else early
+    if crew is not None and sum(len(early.unread(job.read)) for job in jobs) > MOST_READ_HERE:
+        ended = dict(crew(enumerate(jobs), write_month))
+    else:
+        ended = dict(here(enumerate(jobs), partial(write_month, early=early)))
     problems = tuple(one for _, one in sorted(ended.items()) if one.state == "failed")
     if problems:
         return scan(out), problems
@@ -137,20 +143,20 @@ def forget_month(out: Path, month: str) -> None:
         path.unlink(missing_ok=True)
 
 
-def write_month(job: MonthJob, listen: Listener = silent) -> Outcome:
+def write_month(job: MonthJob, listen: Listener = silent, early: EarlyShares | None = None) -> Outcome:
     """Write one month of the dataset, and the samples of the flights that changed.
 
     The outcome says what is wrong.
     """
     try:
-        _write(job)
+        _write(job, EarlyShares(job.out) if early is None else early)
     except OSError as error:
         reason = f"{job.out}: {FLIGHTS} and the samples of {job.month} cannot be written ({error.strerror or error})"
         return Outcome(job.log, "failed", reason, is_beside=True)
     return Outcome(job.log, "done", "", is_beside=True)
 
 
-def _write(job: MonthJob) -> None:
+def _write(job: MonthJob, early: EarlyShares) -> None:
     import pyarrow as pa
 
     keys = read_keys(job.out, job.month).only(job.kept)
@@ -161,7 +167,7 @@ def _write(job: MonthJob) -> None:
     for name in sorted({*job.read, *job.kept}.difference(keys)):
         stamp = stamp_of(job.out, name)
         try:
-            share = share_of(job.out / name, samples)
+            share = early.of(name, stamp) or share_of(job.out / name, samples)
         except GroundstationError:  # it is told of where the fleet is put together
             continue
         shares.append(share)
