@@ -24,9 +24,8 @@ from groundstation.methods.fleet.moments import merged, moments_of
 from groundstation.pipeline.many_flights.fleet import refresh as fleet_refresh
 from groundstation.pipeline.many_flights.fleet import rows as fleet_rows
 from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS, FlightShare
-from groundstation.pipeline.many_flights.fleet.early import EarlyShares
 from groundstation.pipeline.many_flights.fleet.publishing import write_beside
-from groundstation.pipeline.many_flights.fleet.refresh import refresh
+from groundstation.pipeline.many_flights.fleet.refresh import EarlyShares, refresh
 from groundstation.pipeline.many_flights.fleet.rows import share_of
 from groundstation.pipeline.many_flights.fleet.samples import MEANINGS, SAMPLES, SampleStore, partition
 from groundstation.pipeline.many_flights.fleet.scan import FLIGHTS

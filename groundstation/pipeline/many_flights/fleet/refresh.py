@@ -8,6 +8,7 @@ whole, the hidden one last, so that a run that is killed leaves a month that is 
 """
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -17,7 +18,6 @@ from groundstation.base.dataclasses import dataclass
 from groundstation.base.errors import GroundstationError
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.many_flights.fleet.columns import FlightShare, dataset_schema
-from groundstation.pipeline.many_flights.fleet.early import EarlyShares
 from groundstation.pipeline.many_flights.fleet.keys import FlightKeys, Key, key_path, month_of, read_keys, write_keys
 from groundstation.pipeline.many_flights.fleet.rows import share_of
 from groundstation.pipeline.many_flights.fleet.samples import SampleStore
@@ -29,6 +29,7 @@ from groundstation.pipeline.one_flight.progress import Listener, silent
 from groundstation.results.files import parquet_bytes, utf8_text, write_bytes
 
 MOST_READ_HERE = 300  # flights, by the process that leads a run
+MOST_READ_EARLY = 1000  # logs of a run whose shares are read as their flights end; of more, all workers read them
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,43 @@ class MonthJob:
     def name(self) -> str:
         """The same in short."""
         return self.month
+
+
+class EarlyShares:
+    """Shares of flights in the fleet, read as each flight ends, with the stamp of its folder.
+
+    The process that leads a run waits while others compute: reading then costs a user no time. At the end, the shares
+    of 64 flights took as long as two flights.
+
+    Parameters
+    ----------
+    out : Path
+        Holds the flight folders, and the samples that are put there with each share.
+    """
+
+    def __init__(self, out: Path) -> None:
+        self._out, self._samples = out, SampleStore(out)
+        self._found: dict[str, tuple[int, FlightShare]] = {}
+
+    def read(self, flight_ids: Iterable[str]) -> None:
+        """Read the shares of flights that are in place.
+
+        One that cannot be read is left out: whoever puts the fleet together reads it again, and tells why.
+        """
+        for name in flight_ids:
+            stamp = stamp_of(self._out, name)
+            with suppress(Exception):
+                if stamp is not None:
+                    self._found[name] = stamp, share_of(self._out / name, self._samples)
+
+    def of(self, name: str, stamp: int | None) -> FlightShare | None:
+        """Share of a flight whose folder has this stamp; None where none was read with it."""
+        found = self._found.get(name)
+        return found[1] if found is not None and found[0] == stamp else None
+
+    def unread(self, flight_ids: Iterable[str]) -> list[str]:
+        """Return those of the flights that have not been read."""
+        return [name for name in flight_ids if name not in self._found]
 
 
 def refresh(out: Path, crew: Crew | None = None, early: EarlyShares | None = None) -> tuple[Scan, tuple[Outcome, ...]]:

@@ -17,11 +17,10 @@ from groundstation.base.errors import UsageError
 from groundstation.base.halves import cores
 from groundstation.base.to_disk import sync_folder
 from groundstation.pipeline.many_flights.fleet.delta_sink import delta_place, put_flights
-from groundstation.pipeline.many_flights.fleet.early import MOST, EarlyShares
 from groundstation.pipeline.many_flights.fleet.index import write_index_of
 from groundstation.pipeline.many_flights.fleet.installations import told
 from groundstation.pipeline.many_flights.fleet.publishing import FLEET_FILES, write_beside
-from groundstation.pipeline.many_flights.fleet.refresh import refresh
+from groundstation.pipeline.many_flights.fleet.refresh import MOST_READ_EARLY, EarlyShares, refresh
 from groundstation.pipeline.many_flights.fleet.scan import Scan
 from groundstation.pipeline.many_flights.inputs import is_remote, session_folders
 from groundstation.pipeline.many_flights.processes.apart import bounds_of
@@ -244,7 +243,7 @@ def _run_here(
         def suffixed(number: int) -> Job:
             return replace(work[number % len(work)], add_suffix=True, power_up=destination.power_up(number))
 
-        early = EarlyShares(out) if is_elsewhere(crew) and len(work) <= MOST else None
+        early = EarlyShares(out) if is_elsewhere(crew) and len(work) <= MOST_READ_EARLY else None
         with fleet_imported_meanwhile(with_pages=not asked.only_results) if is_elsewhere(crew) else nullcontext():
             _run_into(destination, out, left(), run, suffixed, crew, listen, len(work), early)
         apart = _run_joined(destination, work, in_out, crew, listen, is_isolated=is_isolated)
