@@ -62,3 +62,14 @@ def test_a_run_of_results_alone_imports_nothing_that_draws(monkeypatch: pytest.M
     with imported_meanwhile(with_pages=False):
         pass
     assert imported == list(ahead.COMPUTING)
+
+
+def test_who_waits_for_flights_imports_what_makes_a_fleet_of_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    imported = list[str]()
+    monkeypatch.setattr(ahead, "import_module", imported.append)
+    with ahead.fleet_imported_meanwhile(with_pages=False):
+        pass
+    assert imported == ["cattrs"]
+    with ahead.fleet_imported_meanwhile(with_pages=True):
+        pass
+    assert imported[1:] == ["cattrs", *ahead.FLEET_DRAWING]

@@ -21,10 +21,12 @@ import pytest
 
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.methods.fleet.moments import merged, moments_of
+from groundstation.pipeline.many_flights.fleet import refresh as fleet_refresh
 from groundstation.pipeline.many_flights.fleet import rows as fleet_rows
 from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS, FlightShare
 from groundstation.pipeline.many_flights.fleet.publishing import write_beside
-from groundstation.pipeline.many_flights.fleet.refresh import refresh
+from groundstation.pipeline.many_flights.fleet.refresh import EarlyShares, refresh
+from groundstation.pipeline.many_flights.fleet.rows import share_of
 from groundstation.pipeline.many_flights.fleet.samples import MEANINGS, SAMPLES, SampleStore, partition
 from groundstation.pipeline.many_flights.fleet.scan import FLIGHTS
 from groundstation.pipeline.many_flights.fleet.statistics import FLEET_PARQUET, gather, write_fleet
@@ -484,3 +486,33 @@ def test_simulated_logs_become_a_fleet(tmp_path: Path) -> None:
     assert len(own) == 1 and (np.abs(own) < 3.0).all()
     assert found.flights["samples"].sum() == sum(found.densities.samples)
     assert len(sample_files(tmp_path)) == 2
+
+
+def test_shares_read_as_flights_end_give_the_same_dataset(fleet: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(fleet, out, ignore=shutil.ignore_patterns(FLIGHTS, SAMPLES, FLEET_PARQUET, ".flights"))
+    early = EarlyShares(out)
+    early.read(["no such flight", *sorted(path.name for path in out.iterdir() if (path / "summary.json").exists())])
+    found, unwritten = refresh(out, early=early)
+    _results, problems = write_fleet(out, found)
+    assert unwritten == problems == ()
+    assert contents(out) == contents(fleet)
+
+
+def test_a_share_is_read_once_and_again_where_its_flight_has_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    save_flight(tmp_path, 0, error_deg=0.5)
+    save_flight(tmp_path, 4, error_deg=0.5)
+    first, second = sorted(path.name for path in tmp_path.iterdir())
+    early = EarlyShares(tmp_path)
+    early.read((first, second))
+    save_flight(tmp_path, 4, error_deg=2.5)
+    read: list[str] = []
+    monkeypatch.setattr(
+        fleet_refresh, "share_of", lambda folder, store: (read.append(folder.name), share_of(folder, store))[1]
+    )
+    found, _ = refresh(tmp_path, early=early)
+    results, _ = write_fleet(tmp_path, found)
+    assert read == [second]
+    assert results.flights["error_deg"].tolist() == [0.5, 2.5]

@@ -14,6 +14,7 @@ from groundstation.systems import systems
 
 COMPUTING = ("scipy.special", "cattrs")
 DRAWING = ("groundstation.viewer.recording", "groundstation.reports.page", "jinja2")
+FLEET_DRAWING = ("groundstation.viewer.fleet", "groundstation.reports.page", "jinja2")
 
 
 @contextmanager
@@ -29,8 +30,24 @@ def imported_meanwhile(*, with_pages: bool) -> Iterator[None]:
     ...     print("reading")
     reading
     """
+    with _meanwhile(_imports(with_pages=with_pages)):
+        yield
+
+
+@contextmanager
+def fleet_imported_meanwhile(*, with_pages: bool) -> Iterator[None]:
+    """Import like :func:`imported_meanwhile` what puts flights together to a fleet.
+
+    It is for the process that waits for the flights of others.
+    """
+    with _meanwhile(_fleet_imports(with_pages=with_pages)):
+        yield
+
+
+@contextmanager
+def _meanwhile(imports: Iterator[Callable[[], object]]) -> Iterator[None]:
     is_over = Event()
-    thread = Thread(target=_import_all, args=(tuple(_imports(with_pages=with_pages)), is_over), name="imports")
+    thread = Thread(target=_import_all, args=(tuple(imports), is_over), name="imports")
     thread.start()
     try:
         yield
@@ -46,6 +63,14 @@ def _imports(*, with_pages: bool) -> Iterator[Callable[[], object]]:
     yield from (partial(import_module, name) for name in (*COMPUTING, *(DRAWING if with_pages else ())))
     if with_pages:
         yield from (lambda: systems().tabs, lambda: systems().chapters, lambda: systems().plots)
+
+
+def _fleet_imports(*, with_pages: bool) -> Iterator[Callable[[], object]]:
+    yield partial(import_module, "cattrs")
+    yield lambda: systems().in_fleet
+    if with_pages:
+        yield from (partial(import_module, name) for name in FLEET_DRAWING)
+        yield from (lambda: systems().fleet_chapters, lambda: systems().fleet_plots, lambda: systems().fleet_tabs)
 
 
 def _import_all(imports: tuple[Callable[[], object], ...], is_over: Event) -> None:

@@ -95,14 +95,15 @@ def _window_factors(
 ) -> tuple[FloatArray, FloatArray]:
     """Return factors of the estimate at each lag in d, and in what younger ones share.
 
-    Both have the shape (lags, 6, 6). An estimate is correlated with a younger one as with itself carried to it.
+    Both have the shape (lags, 6, 6). An estimate is correlated with a younger one as with itself carried to it. The
+    lags are equal steps: what is carried to one of them is that of the lag before, carried over one step more.
     """
     weights = _weights(lags, lengths_s)
     V = weights[:, :, None] * (phi if method == "consistent_windows" else np.eye(SIZE))
     V[0] -= np.eye(SIZE)
     younger = np.zeros_like(V)
     for lag in range(1, len(lags)):
-        younger[lag] = (V[:lag] @ phi[lag:0:-1]).sum(axis=0)
+        younger[lag] = (younger[lag - 1] + V[lag - 1]) @ phi[1]
     return V, younger
 
 

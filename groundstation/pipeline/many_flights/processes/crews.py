@@ -37,3 +37,8 @@ def crew_for(
     return partial(
         side_by_side, workers=min(workers, logs), listen=listen, timeout_s=timeout_s, tasks_per_process=tasks
     )
+
+
+def is_elsewhere(crew: Crew) -> bool:
+    """Tell whether the jobs of a crew run in other processes, and this one waits for them."""
+    return not (isinstance(crew, partial) and crew.func is in_turn)

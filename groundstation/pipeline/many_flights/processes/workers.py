@@ -156,7 +156,7 @@ def _until_broken(
     except BaseException:  # interrupted: nobody waits for the rest
         _end(pool, at_once=False)
         raise
-    pool.shutdown()
+    pool.shutdown(wait=False)  # its processes end while this one goes on
 
 
 def _end(pool: ProcessPoolExecutor, *, at_once: bool) -> None:

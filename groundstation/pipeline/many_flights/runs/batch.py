@@ -7,7 +7,7 @@ import math
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path, PurePath
@@ -20,12 +20,12 @@ from groundstation.pipeline.many_flights.fleet.delta_sink import delta_place, pu
 from groundstation.pipeline.many_flights.fleet.index import write_index_of
 from groundstation.pipeline.many_flights.fleet.installations import told
 from groundstation.pipeline.many_flights.fleet.publishing import FLEET_FILES, write_beside
-from groundstation.pipeline.many_flights.fleet.refresh import refresh
+from groundstation.pipeline.many_flights.fleet.refresh import MOST_READ_EARLY, EarlyShares, refresh
 from groundstation.pipeline.many_flights.fleet.scan import Scan
 from groundstation.pipeline.many_flights.inputs import is_remote, session_folders
 from groundstation.pipeline.many_flights.processes.apart import bounds_of
 from groundstation.pipeline.many_flights.processes.crew import AnyJob, Crew, in_turn
-from groundstation.pipeline.many_flights.processes.crews import crew_for
+from groundstation.pipeline.many_flights.processes.crews import crew_for, is_elsewhere
 from groundstation.pipeline.many_flights.processes.workers import TASKS_PER_PROCESS
 from groundstation.pipeline.many_flights.remote.jobs import RemoteJob, digest_remote, run_remote
 from groundstation.pipeline.many_flights.remote.output import RemoteOutput
@@ -44,6 +44,7 @@ from groundstation.pipeline.many_flights.runs.strangers import Strangers
 from groundstation.pipeline.many_flights.sessions.found import SessionOptions, find_sessions, sweep_sessions
 from groundstation.pipeline.many_flights.sessions.job import load_stations
 from groundstation.pipeline.many_flights.sessions.session import run_one
+from groundstation.pipeline.one_flight.ahead import fleet_imported_meanwhile
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job, run_flight
 from groundstation.pipeline.one_flight.identity import plain_id
@@ -242,10 +243,12 @@ def _run_here(
         def suffixed(number: int) -> Job:
             return replace(work[number % len(work)], add_suffix=True, power_up=destination.power_up(number))
 
-        _run_into(destination, out, left(), run, suffixed, crew, listen, len(work))
+        early = EarlyShares(out) if is_elsewhere(crew) and len(work) <= MOST_READ_EARLY else None
+        with fleet_imported_meanwhile(with_pages=not asked.only_results) if is_elsewhere(crew) else nullcontext():
+            _run_into(destination, out, left(), run, suffixed, crew, listen, len(work), early)
         apart = _run_joined(destination, work, in_out, crew, listen, is_isolated=is_isolated)
         clear_unfinished(out)  # of processes that died or took too long
-        found, unwritten = _swept(destination, out, refresher)
+        found, unwritten = _swept(destination, out, refresher, early)
         sessions = _run_sessions(destination, asked, found, crew, listen)
         outcomes = (*destination.outcomes(), *sessions)
         found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
@@ -297,12 +300,14 @@ def _run_joined(
     return tuple(apart)
 
 
-def _swept(destination: Destination, out: Path, crew: Crew | None = None) -> tuple[Scan, tuple[Outcome, ...]]:
+def _swept(
+    destination: Destination, out: Path, crew: Crew | None = None, early: EarlyShares | None = None
+) -> tuple[Scan, tuple[Outcome, ...]]:
     """Bring the dataset of flights up to date.
 
     Flights that these logs have no longer are removed.
     """
-    found, unwritten = refresh(out, crew)
+    found, unwritten = refresh(out, crew, early)
     return refresh(out) if destination.sweep(found) else (found, unwritten)
 
 
@@ -416,10 +421,11 @@ def _run_into(
     crew: Crew,
     listen: Listener,
     logs: int,
+    early: EarlyShares | None = None,
 ) -> None:
     """Carry out jobs and put their flights into place.
 
-    Interrupted, the index at least is written.
+    Interrupted, the index at least is written. What a flight adds to the fleet is read as it ends, with ``early``.
 
     ``logs`` is how many logs there are: the flights of a log have its number, and that and multiples of their count.
     """
@@ -431,6 +437,8 @@ def _run_into(
                     destination.put(number + place * logs, other)
                 flights = destination.flights_of(number, 1 + len(outcome.more))
                 listen(Event("end", PurePath(outcome.source).name, outcome.text, outcomes=flights))
+                if early is not None:
+                    early.read(one.flight_id for one in flights if one.folder and not one.was_finished)
         clashing = destination.clashing()
         if clashing:
             with closing(crew(((number, suffixed(number)) for number in clashing), run)) as ended:
