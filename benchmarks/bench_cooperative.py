@@ -37,7 +37,7 @@ from groundstation.systems.cooperative.settings import ALGORITHMS, CooperativeSe
 from groundstation.systems.cooperative.study.cases import CASES, settings_of  # noqa: E402
 
 Array = NDArray[np.float64]
-SEED, AIRCRAFT, DURATION_S = 2010, 10, 500.0
+SEED, AIRCRAFT, DURATION_S = 2010, 10, 100.0
 RATIO_GOAL, AGREE_SIGMAS = Goal(1.0, "at least"), 1e-6
 FEW_ROUNDS = 3  # of costs without a peer
 COUNTS = (2, 3, 5, 10, 15, 20)

@@ -406,3 +406,17 @@ def test_measurements_out_of_order_or_of_no_state_are_refused() -> None:
         run_filter(still, [-1], Measurements.of([2], [0.0], [[0]], [[1.0]], 1.0), start)
     with pytest.raises(ValueError, match="start"):
         run_filter(still, [-1], Measurements.of([0], [0.0], [[0]], [[1.0]], 1.0), Start(np.zeros(2), np.eye(2)))
+
+
+def test_the_arrays_of_a_record_are_parts_of_one_memory_and_do_not_meet() -> None:
+    n, kept = 40, KeptArrays()
+    walk = Transition.sparse(2, [0], [1], [[0.1]], [0, 1], [0, 1], [[0.5, 0.1]])
+    seen = Measurements.of(np.arange(n), np.sin(np.arange(n)), [[0]] * n, np.ones((n, 1)), 1.0)
+    run = run_filter(walk, [-1, *[0] * (n - 1)], seen, Start(np.zeros(2), np.eye(2)), kept=kept)
+    arrays = [one for one in run.record if one.dtype == np.float64]
+    whole = arrays[0]
+    while whole.base is not None:
+        whole = whole.base
+    places = sorted((one.ctypes.data, one.nbytes) for one in arrays if one.size)
+    assert sum(size for _, size in places) == whole.nbytes
+    assert [at for at, _ in places[1:]] == [at + size for at, size in places[:-1]]

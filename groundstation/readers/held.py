@@ -1,7 +1,7 @@
 """Bytes made once and read anywhere: in memory while they are few, else in a file."""
 
-import io
-from collections.abc import Iterable
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from groundstation.readers.compressed import unnamed_file
@@ -24,18 +24,25 @@ class HeldBytes:
     """
 
     def __init__(self, most: int = MOST_HELD_BYTES) -> None:
-        self._stream: BinaryIO = io.BytesIO()
-        self._most, self._is_file = most, False
-        self.size = 0
+        self._most, self.size = most, 0
+        self._pieces, self._starts = list[memoryview](), list[int]()  # as they came, and where each begins
+        self._file: BinaryIO | None = None  # has them all once they are many
 
     def write(self, data: Any) -> int:
-        """Append bytes and return their number."""
-        self._stream.seek(self.size)
-        self.size += len(data)
-        if self.size > self._most and not self._is_file:
-            held, self._stream, self._is_file = self._stream, unnamed_file(), True
-            self._stream.write(held.getbuffer())  # type: ignore[attr-defined]
-        return self._stream.write(data)
+        """Append bytes, which nobody changes afterwards, and return their number."""
+        count = len(data)
+        if self._file is None and self.size + count > self._most:
+            self._file = unnamed_file()
+            self._file.writelines(self._pieces)
+            self._pieces, self._starts = [], []
+        if self._file is not None:
+            self._file.seek(self.size)
+            self._file.write(data)
+        elif count:
+            self._starts.append(self.size)
+            self._pieces.append(memoryview(data))
+        self.size += count
+        return count
 
     def extend(self, pieces: Iterable[Any]) -> None:
         """Append pieces of bytes."""
@@ -44,14 +51,30 @@ class HeldBytes:
 
     def read(self, at: int, size: int) -> bytes:
         """Return bytes from a place on."""
-        self._stream.seek(at)
-        return self._stream.read(size)
+        if self._file is None:
+            return b"".join(self._views(at, size))
+        self._file.seek(at)
+        return self._file.read(size)
 
     def readinto(self, at: int, buffer: "WriteableBuffer") -> int:
         """Fill a buffer from a place on and return the number of bytes."""
-        self._stream.seek(at)
-        count: int = self._stream.readinto(buffer)  # type: ignore[attr-defined]
-        return count
+        if self._file is not None:
+            self._file.seek(at)
+            count: int = self._file.readinto(buffer)  # type: ignore[attr-defined]
+            return count
+        into, filled = memoryview(buffer).cast("B"), 0
+        for view in self._views(at, len(into)):
+            into[filled : filled + len(view)] = view
+            filled += len(view)
+        return filled
+
+    def _views(self, at: int, size: int) -> Iterator[memoryview]:
+        """Yield up to so many bytes in memory from a place on, as they lie in the pieces."""
+        for place in range(max(bisect_right(self._starts, at) - 1, 0), len(self._pieces)):
+            start = self._starts[place]
+            if start >= at + size:
+                return
+            yield self._pieces[place][max(at - start, 0) : at + size - start]
 
 
 class HeldView(Positioned):

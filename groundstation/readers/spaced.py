@@ -198,7 +198,7 @@ def tighten(text: Any, tight: Any, shape: Any, keeps_blanks: bool, cells: int, i
     at, size, most, end, lines = 0, 0, len(is_joined), len(text), 0
     first, first_size, gaps, count, before, is_torn = 0, 0, 0, 1, 1, False
     is_kept = keeps_blanks or (end > 0 and text[0] == 35)
-    while at < end:
+    while 0 <= at < end and size >= 0:  # no place is negative, and the compiler is told so
         one = text[at]
         if one > 32:
             tight[size] = one
@@ -284,7 +284,7 @@ class FixedSource(MadeSource):
         """Return the lines, and their shape."""
         return lines, shape_of(lines, "\t", is_compiled=True)
 
-    def _parted(self, lines: bytes) -> Iterator[bytes]:
+    def _parted(self, lines: bytes) -> Iterator[Any]:
         """Yield lines with a tab between the columns."""
         bounds = (0, *np.cumsum(self.widths)[:-1].tolist())
         if not lines.isascii():  # a character may have several bytes
@@ -295,7 +295,7 @@ class FixedSource(MadeSource):
             yield from (_parted_line(line, bounds) for line in io.BytesIO(lines))
             return
         text, made = np.frombuffer(lines, np.uint8), np.empty(most, np.uint8)
-        yield made[: part(text, made, np.array(bounds, np.int64), b'"' in lines)].tobytes()
+        yield made[: part(text, made, np.array(bounds, np.int64), b'"' in lines)]
 
 
 def _parted_line(line: bytes, bounds: Sequence[int]) -> bytes:
@@ -339,8 +339,9 @@ def part(text: Any, made: Any, bounds: Any, has_quotes: bool) -> int:
     at, size, columns = 0, 0, len(bounds)
     while at < len(text):
         first = at
-        while text[at] != 10:
-            at += 1
+        if at >= 0:  # no place is negative, and the compiler is told so: else it asks for each byte
+            while text[at] != 10:
+                at += 1
         at += 1
         end = at - 1
         while end > first and text[end - 1] == 13:
@@ -369,9 +370,12 @@ def part(text: Any, made: Any, bounds: Any, has_quotes: bool) -> int:
                     start += 1
                 while stop > start and text[stop - 1] == 32:
                     stop -= 1
-            for place in range(start, stop):
-                made[size] = text[place]
-                size += 1
+            if start >= 0 and size >= 0:
+                count = stop - start
+                for place in range(count):
+                    made[size + place] = text[start + place]
+                if count > 0:
+                    size += count
         for place in range(end, at):
             made[size] = text[place]
             size += 1

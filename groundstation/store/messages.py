@@ -86,9 +86,10 @@ class ChunkMessages:
 
     @cached_property
     def _same(self) -> bytes:
-        """One for each byte of a record that is the same in all of them, else zero; for a stride that is not 0.
+        """Mark of each byte of a record: one where it is the same in all of them, else zero.
 
-        Such a byte is what is left of it by *and* as by *or* over all records, many of which are taken at once.
+        The records must have an even stride. Such a byte is what is left of it by *and* as by *or* over all records,
+        many of which are taken at once.
         """
         matrix = self.matrix()
         rows = WORD.itemsize * max(PIECE_BYTES // (WORD.itemsize * self.stride), 1)
