@@ -252,7 +252,10 @@ def _count(
         ledgers.append(ledger)
         lateness_ns[topic] = late_ns
         outlines.append(outline_of(topic, time_ns, rhythm, limits.gaps))
+        is_long = len(time_ns) > MANY_RECORDS // 4
         del time_ns, rhythm
+        if is_long:
+            give_back()
     ledgers.sort(key=lambda ledger: ledger.topic)
     return _Counted(tuple(ledgers), lateness_ns, tuple(one for one in outlines if one is not None))
 
