@@ -131,9 +131,7 @@ class _Proposal:
 
     def log_density(self, points: FloatArray) -> FloatArray:
         """Return the log density up to a constant common to all proposals."""
-        whitened = (points - self.center) @ np.linalg.inv(
-            self.factor
-        ).T  # solving takes three times as long
+        whitened = (points - self.center) @ np.linalg.inv(self.factor).T  # solving takes three times as long
         size = len(self.center)
         tail = -0.5 * (T_DEGREES + size) * np.log1p(np.sum(whitened**2, axis=1) / T_DEGREES)
         return np.asarray(tail - np.sum(np.log(np.abs(np.diag(self.factor)))))
