@@ -1,6 +1,7 @@
 """What processes of single logs do in tests, by the names of their logs; little is loaded for it."""
 
 import ctypes
+import gc
 import json
 import os
 import signal
@@ -56,6 +57,10 @@ def gain_rights(_out: Path) -> None:
     assert "NoNewPrivs:\t1" in status
 
 
+def tell_threshold(out: Path) -> None:
+    (out / "threshold").write_text(str(gc.get_threshold()[0]))
+
+
 def leave_children(out: Path) -> None:
     """Processes in groups and sessions of their own, which nobody waits for."""
     for number in range(3):
@@ -75,6 +80,7 @@ def leave_children_and_hang(out: Path) -> None:
 
 
 DEEDS: dict[str, Callable[[Path], None]] = {
+    "threshold": tell_threshold,
     "good": lambda _out: None,
     "hangs": lambda _out: time.sleep(ENDLESS_S),
     "takes_memory": take_memory,

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import GroundstationError, SettingsError, UsageError
+from groundstation.base.garbage import NEW_OBJECTS
 from groundstation.pipeline.many_flights.processes import apart
 from groundstation.pipeline.many_flights.processes.apart import DIED, bounds_of, outcomes_apart
 from groundstation.pipeline.many_flights.processes.confined import ProcessLimits
@@ -70,6 +71,14 @@ def test_each_limit_costs_the_log_that_goes_beyond_it_alone(tmp_path: Path) -> N
     assert {one.state for one in found[1:-1]} == {"failed"} and all("\n" not in one.text for one in found)
     assert (tmp_path / "much").stat().st_size <= ISOLATED.file_bytes
     assert [event.name for event in events].count("good") == 2
+
+
+@pytest.mark.parametrize("is_isolated", [True, False])
+def test_a_log_of_its_own_process_has_garbage_searched_for_as_rarely_as_in_a_run(
+    tmp_path: Path, is_isolated: bool
+) -> None:
+    (done,) = run(["threshold"], tmp_path, ProcessLimits(60.0, is_isolated=is_isolated))
+    assert (done.state, (tmp_path / "threshold").read_text()) == ("done", str(NEW_OBJECTS))
 
 
 @pytest.mark.parametrize("is_isolated", [True, False])

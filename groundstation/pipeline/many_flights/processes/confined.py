@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from groundstation.base.dataclasses import dataclass
+from groundstation.base.garbage import search_rarely
 
 LOOK_EVERY_S = 0.05
 ROOM_BYTES = 32 << 30  # of addresses beyond the memory: libraries set aside much more than they use
@@ -63,6 +64,7 @@ def begin(sender: Connection, payload: bytes, bounds: ProcessLimits) -> None:
 
     What comes of it goes to ``sender``.
     """
+    search_rarely()
     if bounds.is_isolated:
         _keep(sender, payload, bounds)
     else:
