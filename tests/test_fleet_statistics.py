@@ -1,10 +1,13 @@
 """Statistics over a fleet: merged without loss, intervals and alarms that keep to the rates they state."""
 
+import ast
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import groundstation
 from groundstation.methods.fleet import answer
 from groundstation.methods.fleet.aircraft import mean_over_flights
 from groundstation.methods.fleet.answer import calibrate
@@ -21,6 +24,7 @@ from groundstation.results.columns import READ_BY_FLEETS
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet_share import SkillOfFlight
 from groundstation.results.fleet_units import UnitLimits
+from groundstation.systems import systems
 from tests.fleet_example import flights_table
 
 LUCK_SIGMAS = 4.0  # of a share counted over simulated series: a right rate is outside once in sixteen thousand tests
@@ -431,3 +435,18 @@ def test_columns_that_statistics_read_are_those_that_systems_give() -> None:
     """A table of flights has them even without the system; a name told twice must not drift."""
     given = {column.name: column.kind for column in FLIGHT_COLUMNS}
     assert {name: given.get(name) for name in READ_BY_FLEETS} == READ_BY_FLEETS
+
+
+def test_every_column_of_a_system_that_pages_of_fleets_read_is_there_without_the_system() -> None:
+    """One that was not left the page of a fleet out where the system was not installed."""
+    given = {column.name for analysis in systems().analyses for column in analysis.columns}
+    package = Path(groundstation.__file__).parent
+    readers = [path for folder in ("chapters", "methods") for path in (package / folder).rglob("fleet/*.py")]
+    read = {
+        node.slice.value
+        for path in (*readers, *package.glob("viewer/fleet*.py"))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant) and node.slice.value in given
+    }
+    assert "forecast_60min_p95_m" in read
+    assert read - READ_BY_FLEETS.keys() == set()

@@ -24,6 +24,7 @@ READ_BY_FLEETS: Mapping[str, Kind] = {
             *("error_deg", "standard_error_deg", "confidence95_low_deg", "confidence95_high_deg", "correction_deg"),
             *("estimate_sd_deg", "sample_mean_deg", "sample_m2_deg2", "onboard_difference_deg"),
             *("reference_residual_arcmin", "radial_error_rate_fit_nmiph", "forecast_60min_rms_m"),
+            *("forecast_60min_p95_m", "raw_60min_p95_m"),
             *("magnetic_before_rms_deg", "magnetic_after_rms_deg", "flux_before_rms_deg", "flux_after_rms_deg"),
             *("health_vibration_mps2", "health_hdop", "health_test_ratio"),
             *("health_vibration_limit_mps2", "health_hdop_limit"),
