@@ -1,9 +1,9 @@
 """Many flights: one and two worker processes, a Dask cluster beside them, memory of a worker, killed runs continued.
 
-``bench_fleet.py [FLIGHTS]``, 500 without it: wall seconds; other programs slow all of them. ``bench_fleet.py FLIGHTS
-stages`` tells what one process spends on a flight, by stage, with everything and with results alone, and results alone
-of flights with an INS; a limit beside them is what compiled loops and Parquet take of it. With ``--pdf`` behind them
-PDFs are written too.
+``bench_fleet.py [FLIGHTS]``, 500 without it: wall seconds; other programs slow all of them. ``bench_fleet.py [FLIGHTS]
+pair`` ends behind one and two workers, some ten minutes for 500 flights. ``bench_fleet.py FLIGHTS stages`` tells what
+one process spends on a flight, by stage, with everything and with results alone, and results alone of flights with an
+INS; a limit beside them is what compiled loops and Parquet take of it. With ``--pdf`` behind them PDFs are written too.
 """
 
 import filecmp
@@ -203,6 +203,8 @@ def workers(book: Book, root: Path, what: str, flights: int) -> None:
     same = different(root / "j1", root / "j2")
     note = f"differ: {', '.join(same[:5])}" if same else "files identical"
     book.figure(f"{what}, two workers", seconds[1] / seconds[2], "times as fast as one", goal=TWO_GOAL, note=note)
+    if "pair" in sys.argv[1:]:
+        return
     again, _peak, _told = timed(["run", logs, "-o", str(root / "j2"), "-j", "2", *PDF])
     book.figure(f"{what}, again, nothing to do", again, "s by the clock")
     if book.has("distributed"):

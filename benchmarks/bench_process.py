@@ -95,9 +95,13 @@ def make_log(suffix: str, size_kb: int, folder: Path) -> Path | None:
     return target
 
 
-def without_bytecode_switch() -> dict[str, str]:
-    """The environment as of a user, whose modules are compiled once and not in every process."""
-    return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+def environment_of_all() -> dict[str, str]:
+    """The environment as of a user, whose modules are compiled once and not in every process.
+
+    numpy's BLAS starts no threads: on some machines they spin while it is imported, and every side has them.
+    """
+    usual = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    return usual | {"OPENBLAS_NUM_THREADS": "1"}
 
 
 def peers(log: Path, out: Path) -> Iterator[tuple[str, list[str]]]:
@@ -118,7 +122,7 @@ def commands(log: Path, work: Path, verbs: list[str], against: Path | None, *, i
     """What is run on a log: our verbs, the same of another checkout, the peers' unless ours are alone."""
     found = []
     for label, root in (("groundstation", ROOT), *([("against", against)] if against else [])):
-        environment = without_bytecode_switch() | {"PYTHONPATH": str(root)}
+        environment = environment_of_all() | {"PYTHONPATH": str(root)}
         ours = [sys.executable, "-m", "groundstation"]
         for verb in verbs:
             target = str(work / f"{label}_{verb}")
@@ -138,7 +142,7 @@ def commands(log: Path, work: Path, verbs: list[str], against: Path | None, *, i
         if program is None:
             print(f"  {name}: {command[0]} is not installed, left out")
         else:
-            found.append(Timed(name, [program, *command[1:]], without_bytecode_switch()))
+            found.append(Timed(name, [program, *command[1:]], environment_of_all()))
     return found
 
 
@@ -146,11 +150,11 @@ def measure(book: Book, what: str, log: Path, options: argparse.Namespace) -> No
     """Run all commands on a log by turns and record their medians, beside what bounds them."""
     with tempfile.TemporaryDirectory() as folder:
         timed = commands(log, Path(folder), options.verbs, options.against, is_alone=options.no_peers)
-        bare = Timed(IMPORTS, [sys.executable, "-c", "import numpy, pyarrow"], without_bytecode_switch())
+        bare = Timed(IMPORTS, [sys.executable, "-c", "import numpy, pyarrow"], environment_of_all())
         needed = Timed(
             "limit: imports of other packages that convert needs",
             [sys.executable, "-c", NEEDED_OF_TABLES if log.suffix == ".csv" else NEEDED],
-            without_bytecode_switch(),
+            environment_of_all(),
         )
         timed += [bare, needed]
         if options.cold:
