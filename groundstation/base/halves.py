@@ -73,12 +73,12 @@ def two_at_once(function: Callable[[One], Other], items: Sequence[One]) -> list[
     """
     if len(items) < 2 or cores() < 2:
         return [function(one) for one in items]
-    made, left, lock = dict[int, Other](), iter(enumerate(items)), Lock()
+    made, left, lock = dict[int, Other](), iter(range(len(items))), Lock()
 
     def run() -> None:
         while True:
             with lock:
-                at, _ = next(left, (-1, None))
+                at = next(left, -1)
             if at < 0:
                 return
             made[at] = function(items[at])

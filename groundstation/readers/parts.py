@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.dataclasses import dataclass
+from groundstation.base.one_memory import arrays_at_once
 from groundstation.base.records import (
     MAX_BATCH_ROWS,
     BoolArray,
@@ -107,14 +108,13 @@ def merged(topic: str, parts: Sequence[TopicPart]) -> RecordBatch:
         for name in dict.fromkeys(name for part in parts for name in part.columns)
     }
     kinds = {name: np.result_type(*(one.values.dtype for _number, one in known)) for name, known in several.items()}
-    memory = iter(np.empty((sum(kind == np.float64 for kind in kinds.values()), len(index))))  # at once: larger pages
+    memory = dict(zip(kinds, arrays_at_once([(index.shape, kind) for kind in kinds.values()]), strict=True))
     for name, known in several.items():
         pieces = [(places_of[number], column) for number, column in known]
         key = tuple((number, id(column.present)) for number, column in known)
         if key not in masks:
             masks[key] = _present(pieces, len(index))
-        values = next(memory) if kinds[name] == np.float64 else np.empty(len(index), kinds[name])
-        columns[name] = Column(_laid(pieces, values), masks[key])
+        columns[name] = Column(_laid(pieces, memory[name]), masks[key])
     times = list(zip(places_of, [part.time for part in parts], strict=True))
     time = Column(_laid(times, np.empty(len(index), dtype=np.int64)), _present(times, len(index)))
     validity_ns = None

@@ -132,8 +132,7 @@ class StoreWriter:
                     for channel in self._channels.values():
                         channel.flush()
                     self._write_log()
-                    self._send()
-                    self._wait_until_left(0)
+                    self._settle()
                     with part.open("wb") as file:
                         told = DigestedFile(file, self._threads)
                         self._finish(told)
@@ -193,8 +192,7 @@ class StoreWriter:
 
     def _write_log(self) -> None:
         """Write findings and events as one channel, behind all others."""
-        self._send()
-        self._wait_until_left(0)
+        self._settle()
         ends = [(chunk.place.start_ns, chunk.place.end_ns) for chunk in self._chunks]
         if ends:
             first_ns, last_ns = min(start for start, _ in ends), max(end for _, end in ends)
@@ -229,6 +227,12 @@ class StoreWriter:
         self._on_their_way.append(self._threads.submit(self._compressed, self._gathered))
         self._gathered, self._bytes = [], 0
         self._wait_until_left(MOST_ON_THEIR_WAY)
+
+    def _settle(self) -> None:
+        """Wait until all chunks that were handed over are in the spool."""
+        if self._gathered:
+            self._send()
+        self._wait_until_left(0)
 
     def _wait_until_left(self, count: int) -> None:
         """Keep the compressed chunks, in the order in which they were handed over."""

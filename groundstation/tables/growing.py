@@ -1,16 +1,15 @@
 """A table that takes batch after batch: every column is held once."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.one_memory import arrays_at_once
 from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
 from groundstation.tables.table import Table
 
 MORE = 8  # a column that is full gets room for an eighth more
-ALIGNED = 64  # bytes
 MOST_AHEAD = 1024  # times the rows that came: what a damaged count asks for beyond is not believed
 
 
@@ -45,7 +44,7 @@ class GrowingTable:
         room = max(min(self._expected, MOST_AHEAD * end), end)
         new = {name: one.values.dtype for name, one in batch.columns.items() if name not in self._columns}
         clocks = [] if start else [np.dtype(np.int64)] * 3
-        memory = _at_once([*clocks, *new.values()], room)
+        memory = arrays_at_once([((room,), kind) for kind in (*clocks, *new.values())])
         if clocks:
             self._time_ns, self._index, self._device = map(_Growing, memory[:3])
         self._columns |= zip(new, map(_Growing, memory[len(clocks) :]), strict=True)
@@ -123,24 +122,6 @@ class _Growing:
                 self._present[:start] = False
         elif common != self._values.dtype:
             self._values = _moved(self._values, start, len(self._values), common)
-
-
-def _at_once(kinds: Sequence[np.dtype[Any]], rows: int) -> list[NDArray[Any]]:
-    """Return an array of each type, all in one piece of memory.
-
-    The system gives larger pages for it.
-
-    Examples
-    --------
-    >>> [one.shape for one in _at_once([np.dtype("f4"), np.dtype("U3")], 5)]
-    [(5,), (5,)]
-    """
-    ends = np.cumsum([-(-rows * kind.itemsize // ALIGNED) * ALIGNED for kind in kinds]).tolist()
-    memory = np.empty(ends[-1] if ends else 0, dtype=np.uint8)
-    return [
-        memory[start : start + rows * kind.itemsize].view(kind)
-        for kind, start in zip(kinds, [0, *ends[:-1]], strict=False)
-    ]
 
 
 def _moved(values: NDArray[Any], rows: int, room: int, dtype: np.dtype[Any]) -> NDArray[Any]:

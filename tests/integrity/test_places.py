@@ -62,14 +62,14 @@ def test_windows_tell_what_the_whole_tells(seed: int, is_counting: bool, monkeyp
     assert described(whole) == described(windowed)
 
 
-def long_log(blocks: int) -> Iterator[Item]:
-    """Blocks of 60 000 records of 30 topics, 100 in a second."""
+def long_log(blocks: int, records: int = 60_000, topics: int = 30, of_one_time: int = 1) -> Iterator[Item]:
+    """Blocks of records of several topics, 100 different times in a second."""
     yield LogHeader("test", has_counting_clock=True)
     for block in range(blocks):
-        index = np.arange(60_000) + block * 60_000
-        for number in range(30):
-            which = index[number::30]
-            yield RecordBatch(f"raw.t{number}", which, Column(which * 10_000_000), {})
+        index = np.arange(records) + block * records
+        for number in range(topics):
+            which = index[number::topics]
+            yield RecordBatch(f"raw.t{number}", which, Column(which // of_one_time * 10_000_000), {})
 
 
 def test_memory_of_a_survey_hardly_grows_with_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -86,23 +86,13 @@ def test_memory_of_a_survey_hardly_grows_with_the_log(monkeypatch: pytest.Monkey
     assert peaks[1] < 24e6 and peaks[1] - peaks[0] < 4e6, peaks
 
 
-def two_topics(blocks: int) -> Iterator[Item]:
-    """Blocks of 50 000 records of two topics; of two records one after the other, both have one time."""
-    yield LogHeader("test", has_counting_clock=True)
-    for block in range(blocks):
-        index = np.arange(100_000) + block * 100_000
-        for number in range(2):
-            which = index[number::2]
-            yield RecordBatch(f"raw.t{number}", which, Column(which // 4 * 10_000_000), {})
-
-
 def test_times_of_one_topic_alone_are_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     """They are its times and its steps, 16 bytes a record, and what marks some: not those of the topic before too."""
     monkeypatch.setattr(places, "WINDOW_RECORDS", 100_000)
     monkeypatch.setattr(places, "MEMORY_BYTES", 1 << 20)
     blocks = 40
     tracemalloc.start()
-    found = survey(two_topics(blocks))
+    found = survey(long_log(blocks, 100_000, 2, of_one_time=4))
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert [topic.duplicates for topic in found.ledger.topics] == [1_000_000, 1_000_000]
@@ -125,5 +115,5 @@ def test_a_long_log_gives_freed_memory_back(blocks: int, times: int, monkeypatch
     module = sys.modules[survey.__module__]
     monkeypatch.setattr(module, "MANY_RECORDS", 250_000)
     monkeypatch.setattr(module, "give_back", lambda: given.append(1))
-    survey(two_topics(blocks))
+    survey(long_log(blocks, 100_000, 2, of_one_time=4))
     assert len(given) == times

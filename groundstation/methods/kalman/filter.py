@@ -4,7 +4,6 @@ It costs as much as the matrices have entries. The frozen types hold arrays; the
 ``smoother_runs``). A compiled loop of another folder may call their parts (``kernels``) itself.
 """
 
-import math
 from dataclasses import field
 from functools import cached_property
 from typing import Self
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from groundstation.base.dataclasses import dataclass
+from groundstation.base.one_memory import arrays_at_once
 from groundstation.base.records import Int64Array, frozen
 from groundstation.methods.kalman.arrays import (
     NO_STEP,
@@ -353,10 +353,8 @@ def _room(n: int, m: int, size: int, channels: int, kept: KeptArrays) -> FilterR
         "judged_innovation": (judged, channels),
         "judged_variance": (judged,),
     }
-    ends = np.cumsum([math.prod(shape) for shape in shapes.values()])
-    parts = np.split(np.empty(ends[-1]), ends[:-1])
-    arrays = {name: part.reshape(shape) for (name, shape), part in zip(shapes.items(), parts, strict=True)}
-    return FilterRecord(mark=np.zeros(m, dtype=np.int8), **arrays)
+    arrays = arrays_at_once([(shape, np.float64) for shape in shapes.values()])
+    return FilterRecord(mark=np.zeros(m, dtype=np.int8), **dict(zip(shapes, arrays, strict=True)))
 
 
 def forecast_driven(
